@@ -16,6 +16,7 @@ import typer
 
 from generators.kernel import files_table
 from generators.laws import POINT
+from generators.lemmas import lemmas_table
 from generators.proved import beside_table, costs_table
 from generators.sets import sets_table
 from generators.sharpness import sharpness_table
@@ -170,7 +171,7 @@ def counts_text() -> str:
     return (
         f"{len(catalogue())} [laws](docs/laws.md) for attitude and {len(catalogue(POINT))} of station keeping, "
         f"{others} other [parts](docs/parts.md), {len(builtin_names())} scenarios,\n"
-        f"{len(known)} [commands](docs/commands.md), and {len(PAPERS)} [publications](docs/publications.md) made again."
+        f"{len(known)} [commands](docs/commands.md), and {len(PAPERS)} reproduced [publications](docs/publications.md)."
     )
 
 
@@ -214,6 +215,7 @@ TABLES = {
     "limits of models": limits_table,
     "kernel files": files_table,
     "invariant sets": sets_table,
+    "lemmas": lemmas_table,
     "dice": lambda: methods_table(Dice),
     "proved and measured": beside_table,
     "costs of sources": lambda: costs_table("cubesat-nadir"),

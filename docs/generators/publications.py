@@ -1,4 +1,4 @@
-"""The page of the publications that `starhold reproduce` makes again."""
+"""Writes the page on the publications that `starhold reproduce` reproduces."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ from generators.tables import table
 from starhold.publications.paper import PAPERS, read_paper
 from starhold.publications.verdicts import VERDICTS
 
-HEAD = """# The publications, made again
+HEAD = """# The publications, reproduced
 
-starhold implements what five publications describe. Each of their figures, tables and statements that can be checked is made
-again by one command and compared with what is printed:
+starhold implements the methods of five publications. One command reproduces each of their figures, tables and statements
+that can be checked and compares it with the printed one:
 
 ```
 starhold reproduce all -o published   # or one of A to E; needs the extra `campaign`
 ```
 
 `published/index.html` leads to a page for each publication, which opens offline, with every figure and the rows *printed,
-ours, difference, verdict*; `summary.json` has the rows for programs, and the folders `A` to `E` the scenario files that were
-flown. The command ends with exit code 1 if a verdict is another than the one recorded, so that a change of the code that
-changes a result is seen. From Python, `sh.reproduce("D")` gives the rows and the curves.
+ours, difference, verdict*; `summary.json` has the rows for programs, and the folders `A` to `E` contain the flown scenario
+files. The command ends with exit code 1 if a verdict differs from the recorded one, so that a change of the code that
+changes a result is noticed. From Python, `sh.reproduce("D")` gives the rows and the curves.
 
-Verdicts are computed from what is measured and from the printed digits:
+Verdicts are computed from the measured values and the printed digits:
 """
 
 TAIL = """
-What a publication says lies in `src/starhold/publications/papers/LETTER/paper.toml`, row by row, with who measures it;
-scenario files lie beside it, and modules with what no scenario holds. Only the texts of the publications were at hand,
-not their pictures: figures are compared with what the texts say of them.
+`src/starhold/publications/papers/LETTER/paper.toml` lists the statements of a publication, row by row, with their measures;
+scenario files are in the same folder, and modules for everything else. Only the texts of the publications were available,
+not their pictures: figures are compared with their descriptions in the text.
 """
 
 
 def page() -> str:
-    """Return the page: verdicts and their meanings, the publications with the verdicts recorded, all errata."""
+    """Return the page: verdicts and their meanings, the publications with the recorded verdicts, all errata."""
     papers = [read_paper(letter) for letter in PAPERS]
     lines = [HEAD, table(["verdict", "meaning"], [[word, meaning] for word, meaning in VERDICTS.items()]), ""]
     rows: list[list[str]] = []

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 @shortly
 def load(source: str | Path, allow_unstable: bool = False) -> reading.Scenario:
-    """The scenario in a TOML file, or the built-in one of that name. InputError says what is wrong with it."""
+    """Return the scenario in a TOML file, or the built-in one of that name. InputError states the first error in it."""
     return reading.load(source, allow_unstable)
 
 
@@ -57,9 +57,9 @@ def simulate(
     progress: Callable[[int, int], None] | None = None,
     process: str | None = None,
 ) -> xr.Dataset:
-    """Fly one law of a scenario, the first if `law` is None; process: a program that commands in its place. Returns the
-    Dataset that `starhold run` writes to run.nc, with the same attributes; `attrs["diverged_at"]` (s) is there only when the
-    motion was lost."""
+    """Fly one law of a scenario, by default the first; process: a program that commands in its place. Returns the Dataset
+    that `starhold run` writes to run.nc, with the same attributes; `attrs["diverged_at"]` (s) exists only if the motion
+    diverged."""
     opened = reading.open_scenario(scenario)
     entry = opened.pick(law)
     return studies.record(opened, studies.build(opened, entry), progress, process).dataset()
@@ -67,8 +67,8 @@ def simulate(
 
 @shortly
 def stepper(scenario: reading.Scenario | str | Path, law: str | None = None, *, record: bool = True) -> Stepper:
-    """A flight that advances by one control period at each call of `step(command)`. Without a command the law decides, the
-    first if `law` is None, and the bits are those of `simulate`. record: whether samples are kept for `dataset()`."""
+    """Return a flight that advances by one control period at each call of `step(command)`. Without a command the law, by
+    default the first, commands, and the bits are those of `simulate`. record: whether samples are kept for `dataset()`."""
     return steppers(scenario, None, law, record=record)
 
 
@@ -76,7 +76,8 @@ def stepper(scenario: reading.Scenario | str | Path, law: str | None = None, *, 
 def steppers(
     scenario: reading.Scenario | str | Path, lanes: int | None, law: str | None = None, *, record: bool = False
 ) -> Stepper:
-    """So many flights side by side, each with its own random numbers: numbers are arrays (lanes,), commands (lanes, 3)."""
+    """Return `lanes` flights side by side, each with its own random numbers; numbers are arrays (lanes,), commands
+    (lanes, 3)."""
     from starhold.simulation.stepper import Stepper
 
     opened = reading.open_scenario(scenario)
@@ -91,9 +92,9 @@ def environment(
     lanes: int | None = None,
     reward: Reward | None = None,
 ) -> Environment | Environments:
-    """A scenario as an environment of Gymnasium (extra `gym`), or as one of `lanes` flights. Flight software's readings are
-    observed, actions are commands. reward: by the readings after a period and the command; None: minus the angle to the
-    target."""
+    """Return a scenario as a Gymnasium environment (extra `gym`), or as a vector environment of `lanes` flights. The
+    observations are the readings of flight software, the actions its commands. reward: a function of the readings after a
+    period and the command; by default minus the angle to the target."""
     optional("gymnasium", "environments", "gym")
     from starhold.studies.environment import Environment, Environments
 
@@ -103,10 +104,10 @@ def environment(
 
 @shortly
 def metrics(run: xr.Dataset | Flight) -> Metrics:
-    """The numbers that say how well a run went, a dictionary whose `units` has the unit (SI) of each; None where there is
-    none: of what `simulate` returns or `run.nc` holds, by the tolerances of its scenario; of a Flight those that it has.
-    Neither flown nor timed again, so that only a Flight has what the law's calls cost. ValueError for a Dataset that is no
-    run."""
+    """Return the metrics of a run: a dictionary with numbers, or None where there is no value, whose `units` has the unit
+    (SI) of each. run: a Dataset of `simulate` or `run.nc`, measured by the tolerances of its scenario, or a Flight, whose
+    metrics are returned. Nothing is flown or timed again, so only a Flight has the cost of the law's calls. ValueError for a
+    Dataset that is not a run."""
     if not hasattr(run, "data_vars"):
         expect(getattr(run, "metric_set", run), MetricSet, "metrics", "a run of sh.simulate, or a flight of sh.compare")
         flight = cast("Flight", run)
@@ -138,25 +139,25 @@ def campaign(
     proof: bool = False,
     progress: Callable[[str, int], None] | None = None,
 ) -> CampaignResult:
-    """Fly many runs of a scenario with numbers drawn from distributions, and judge what is required of them.
+    """Fly many runs of a scenario with numbers drawn from distributions, judge its requirements, and return the results.
 
-    over: a distribution for each key that is drawn, {"initial.rate": {"distribution": "shell", "high": "4 deg/s"}};
-    requirement: bounds of metrics, [{"metric": "settling_time", "at_most": 120, "share": 0.99, "confidence": 0.9}]; metrics:
-    costlier ones to be measured too, "overshoot" or "iterations". These, with `runs`, `sampling` and `seed`, stand in place
-    of what the scenario's [campaign] table has. law: one law, else all. Results are kept in `folder`, or in one that goes
-    with this process; `resume` flies there what is missing. threads, workers (processes), scheduler (the address of a Dask
-    cluster), gpu: who flies; results are the same bits. until_decided: end as soon as every requirement is met or missed,
-    `runs` at the most. search: look for the worst, too. proof: compare flights with what is proved of the loop as it flies,
-    too, which takes seconds a law: `claim` of each law. progress: called with a law and how many more of its runs were
-    flown.
+    over: a distribution for each drawn key, {"initial.rate": {"distribution": "shell", "high": "4 deg/s"}}; requirement:
+    bounds on metrics, [{"metric": "settling_time", "at_most": 120, "share": 0.99, "confidence": 0.9}]; metrics: additional
+    costly metrics, "overshoot" or "iterations". These, with `runs`, `sampling` and `seed`, replace the entries of the
+    scenario's [campaign] table. law: one law, by default all. Results are kept in `folder`, by default in one that is
+    removed at the end of this process; `resume` flies the runs missing there. threads, workers (processes), scheduler (the
+    address of a Dask cluster), gpu: the engine, which does not change a bit of the results. until_decided: stop as soon as
+    every requirement is met or missed, after at most `runs`. search: whether to search for worst cases too. proof: whether
+    to compare flights with the claim proved about the loop as it flies, which takes seconds per law: `claim` of each law.
+    progress: called with a law and the number of further runs flown.
 
-    InputError for whatever is wrong, what was flown until then being kept."""
+    InputError for any mistake or failure; the runs flown until then are kept."""
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
 
     changes: dict[str, Any] = {"runs": runs, "over": over, "metrics": metrics, "sampling": sampling}
     changes |= {"seed": seed, "requirement": requirement}
-    # Of any kind that can be gone through; a word or a table is refused by what reads it.
+    # Any iterable is accepted here; a string or a table is refused where it is read.
     plain = {
         key: list(value) if key in ("metrics", "requirement") and not isinstance(value, str | Mapping | None) else value
         for key, value in changes.items()
@@ -168,8 +169,8 @@ def campaign(
 
 @shortly
 def to_pandas(results: Any) -> DataFrame:
-    """Results as a tidy table: a run with a row a sample and a column a component (`rate_x`), flights with a row a law,
-    certificates with a row a claim, designs with a row a law, margins with a row an axis. TypeError for anything else."""
+    """Return results as a tidy table: a run with a row per sample and a column per component (`rate_x`), flights and designs
+    with a row per law, certificates with a row per claim, margins with a row per axis. TypeError for anything else."""
     from starhold.studies.frames import to_pandas as table_of
 
     return table_of(results)
@@ -177,15 +178,16 @@ def to_pandas(results: Any) -> DataFrame:
 
 @shortly
 def design(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Design]:
-    """The gains that formulas give, with what they can be judged by: every law of a scenario that has a `form`, or the one
-    of this name. InputError where there is none."""
+    """Return the designed gains with figures of merit, for every law of a scenario that has a `form`, or for the one of this
+    name. InputError where there is none."""
     return studied("design", scenario, law)
 
 
 @shortly
 def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Certificate]:
-    """Prove what can be proved of every law of a scenario, or of the one of this name, on its spacecraft. Each certificate
-    has an `outcome` and `claims` (numbers in SI, of station keeping scaled), and has been tested by ten thousand flights."""
+    """Return certificates with the claims that can be proved about every law of a scenario, or the one of this name, on its
+    spacecraft. Each has an `outcome` and `claims` (numbers in SI, scaled for station keeping), and has been tested by ten
+    thousand flights."""
     from starhold.studies.certificates import certify_scenario
 
     return [tried.certificate for tried in certify_scenario(reading.open_scenario(scenario), law)]
@@ -193,8 +195,8 @@ def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> 
 
 @shortly
 def compare(scenario: reading.Scenario | str | Path, proof: bool = False) -> list[Flight]:
-    """Fly every law of a scenario; each Flight has the run (`run`, a Dataset), its `metrics` (SI) and its `certificates`.
-    proof: prove how near to the target each loop stays as it flies, too, which takes seconds a law."""
+    """Fly every law of a scenario and return the flights; each has the run (`run`, a Dataset), its `metrics` (SI) and its
+    `certificates`. proof: whether to prove a pointing bound for each loop as it flies too, which takes seconds per law."""
     return studies.compare(reading.open_scenario(scenario), pointing=proof)
 
 
@@ -209,13 +211,12 @@ def export_c(
     certify: bool = True,
     force: bool = False,
 ) -> Exported:
-    """Write a law of a scenario, the first if `law` is None, as C99 into a folder: header, source, a self-test that demands
-    the simulation's bits, CMakeLists.txt, and the certificate whose digest the header has.
+    """Write a law of a scenario, by default the first, as C99 into a folder: header, source, a self-test that requires the
+    simulation's bits, CMakeLists.txt, and the certificate whose digest is in the header.
 
-    name: what functions and files begin with, the law's if None; shells: what else is to call it, of "basilisk",
-    "fmu", "cfs", "fprime", "process".
-    InputError for what has no form in C, a name that is no identifier, and a folder that holds results (unless `force`) or
-    cannot be written."""
+    name: the prefix of functions and files, by default the law's name; shells: further wrappers, of "basilisk", "fmu",
+    "cfs", "fprime", "process". InputError for a law that cannot be written in C, a name that is not an identifier, and a
+    folder that holds results (unless `force`) or cannot be written."""
     import hashlib
     import re
 
@@ -244,9 +245,9 @@ def export_c(
 def export_requirements(
     scenario: reading.Scenario | str | Path, file: str | Path, original: str | Path | None = None
 ) -> Path:
-    """Write the requirements of a scenario, with their attributes, to a CSV or ReqIF file, by its suffix, and return the
-    path. original: a ReqIF file whose content is kept but for what differs. A scenario reads such files where a
-    [[requirement]] names one as its `file`. InputError for another suffix and for what cannot be written."""
+    """Write the requirements of a scenario, with their attributes, to a CSV or ReqIF file, depending on its suffix, and
+    return the path. original: a ReqIF file whose content is kept except where it differs. A scenario reads such a file where
+    a [[requirement]] names it as `file`. InputError for another suffix and where the file cannot be written."""
     from starhold.scenario.requirement_files import write_requirement_file
 
     into = Path(file)
@@ -260,33 +261,33 @@ def export_requirements(
 
 @shortly
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> list[Failure]:
-    """Return the control left after the loss of any one or two wheels, under a law, or the first; proof: how near its target
-    the loop is proved to stay after each, too, which takes seconds each."""
+    """Return the control authority after the loss of any one or two wheels, under a law, by default the first; proof:
+    whether to prove a pointing bound after each loss too, which takes seconds each."""
     return studied("failures", scenario, law, proof=proof)
 
 
 @shortly
 def budget(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> Budget:
-    """Tell a law's pointing error by source: the first law if not given, at the times and windows of the [budget] table.
-    Each source flies alone, and all together, in as many runs as the table says; `level(source, index)` is in rad, `table()`
-    a DataFrame with every axis. proof: prove how near to its target the loop stays, too, and each source's share of that,
-    which takes seconds each: `proof` of the result. InputError where nothing disturbs the loop, windows do not fit, or a
-    motion is lost."""
+    """Return the pointing error of a law, by default the first, by source, for the times and windows of the [budget] table.
+    Each source flies alone, and all fly together, in the table's number of runs; `level(source, index)` is in rad, `table()`
+    a DataFrame with every axis. proof: whether to prove a pointing bound and each source's share of it too, which takes
+    seconds each: `proof` of the result. InputError where nothing disturbs the loop, windows do not fit, or a motion
+    diverges."""
     return studied("budget", scenario, law, proof=proof)
 
 
 @shortly
 def verify(scenario: reading.Scenario | str | Path, law: str | None = None) -> tuple[RequirementVerdict, ...]:
-    """Return which requirements of a scenario a law keeps, the first law if not given: a verdict for each [[requirement]],
-    in order, with number, limit and margin (SI), and what it rests on. InputError for any mistake, before anything is flown.
+    """Return the verdicts on a law, by default the first: one for each [[requirement]] of the scenario, in order, with
+    number, limit and margin (SI), and the evidence. InputError for any mistake, before anything is flown.
     """
     return studied("verify", scenario, law)
 
 
 @shortly
 def review(scenario: reading.Scenario | str | Path, law: str | None = None, folder: str | Path | None = None) -> Review:
-    """Gather what a review of a law shows, the first law if not given: `verdicts` and the `evidence` that they rest on; and
-    write it into a folder without results, if one is given, as review.html and review.md. InputError as of `verify`."""
+    """Return the contents of a review of a law, by default the first: `verdicts` and the `evidence` for them; also write
+    them as review.html and review.md into a folder without results, if one is given. InputError as in `verify`."""
     from starhold.report.results import study_into
 
     return study_into("review", (reading.open_scenario(scenario), law), None if folder is None else Path(folder))
@@ -294,9 +295,9 @@ def review(scenario: reading.Scenario | str | Path, law: str | None = None, fold
 
 @shortly
 def linearise(scenario: reading.Scenario | str | Path, law: str | None = None, delay: float = 0.0) -> LinearLoop:
-    """The linear loop of a law of a scenario, the first if `law` is None, near rest on target, as systems of python-control:
-    `plant`, `law`, `loop` (cut at the command) and `closed` in continuous time, the same in `sampled`, exact for a held
-    command. delay: from the control instant until the command acts (s). InputError for a law that iterates or switches
+    """Return the linear loop of a law, by default the first, near rest on target, as systems of python-control: `plant`,
+    `law`, `loop` (opened at the command) and `closed` in continuous time, and the same in `sampled`, exact for a held
+    command. delay: time (s) from the control instant until the command acts. InputError for a law that iterates or switches
     there or whose memory never comes to rest, and where python-control is not installed."""
     from starhold.studies.linear import linear_of, systems_of
 
@@ -306,8 +307,8 @@ def linearise(scenario: reading.Scenario | str | Path, law: str | None = None, d
 
 @shortly
 def margins(scenario: reading.Scenario | str | Path, law: str | None = None, delay: float = 0.0) -> list[Margins]:
-    """Gain, phase and delay margins of the linear loop about each body axis, the loops about the others closed: see
-    `linearise`, of whose sampled loop they are. NaN, and a warning why, where that loop is not stable."""
+    """Return the gain, phase and delay margins of the linear loop about each body axis, with the loops about the other axes
+    closed. They are those of the sampled loop of `linearise`; NaN, with a warning, where that loop is not stable."""
     from starhold.studies.linear import margins_of
 
     opened = reading.open_scenario(scenario).about("rigid-body")
@@ -316,13 +317,14 @@ def margins(scenario: reading.Scenario | str | Path, law: str | None = None, del
 
 @shortly
 def modal_roots(scenario: reading.Scenario | str | Path, law: str | None = None) -> Study:
-    """The roots of the modal law that turn fastest within the limits of a scenario's [transient] table, and the fit."""
+    """Return the roots of the modal law that slew fastest within the limits of a scenario's [transient] table, and the
+    fit."""
     return studied("modal-roots", scenario, law)
 
 
 @shortly
 def studied(name: str, *about: Any, proof: bool = False, **options: Any) -> Any:
-    """Run the command of a name as a study: of a law of a scenario, or of its own subject, with its options."""
+    """Run the command of this name as a study of a law of a scenario, or of its own subject, and return what it computes."""
     from starhold.report.commands import command
 
     declared = command(name)
@@ -333,9 +335,9 @@ def studied(name: str, *about: Any, proof: bool = False, **options: Any) -> Any:
 
 @shortly
 def reproduce(letter: str) -> Reproduction:
-    """Make the figures and numbers of a publication ("A" to "E") again. `rows` has, by name, what is printed, what was found
-    and the verdict; `figures` the curves; `changed` the rows whose verdict is another than the one recorded. InputError for
-    any other letter."""
+    """Reproduce the figures and numbers of a publication ("A" to "E"). `rows` has, by name, the printed values, ours and the
+    verdict; `figures` has the curves, `changed` the rows whose verdict differs from the recorded one. InputError for any
+    other letter."""
     from starhold.publications.paper import paper_of
     from starhold.publications.reproduction import reproduce as make
 
@@ -344,7 +346,7 @@ def reproduce(letter: str) -> Reproduction:
 
 @shortly
 def invariant(problem: InvariantProblem | str | Path) -> Certificate:
-    """Prove what can be of invariant sets: of a problem made in Python (`starhold.certification.invariant`), of a TOML
-    file, or of the built-in problem of that name. Each claim has an `outcome`, numbers (`level`, the set's size) and
-    evidence."""
+    """Return a certificate of the claims about invariant sets in a problem: one made in Python
+    (`starhold.certification.invariant`), one in a TOML file, or the built-in one of that name. Each claim has an `outcome`,
+    numbers (`level`, the size of the set) and evidence."""
     return studied("invariant", problem)

@@ -201,7 +201,7 @@ def test_faults_never_come():
         ({"budget.requirement": {"ape": 1}}, "an old key; allowed: [[requirement]] tables"),
         ({"requirement": [{"method": "budget", "metric": "ake", "at_most": 1}]}, "did you mean ape?"),
         ({"requirement": [{"method": "budget", "metric": "ape", "at_least": 1}]}, "requirement[1].at_least"),
-        ({"environment": None, "sensor": None}, "nothing that disturbs the loop"),
+        ({"environment": None, "sensor": None}, "no disturbance of the loop"),
         ({"initial.rate": ["3000 rad/s", 0, 0]}, "the motion diverges at"),
     ],
 )

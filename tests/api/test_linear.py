@@ -48,7 +48,7 @@ def test_a_law_that_leaves_an_axis_alone_has_margins_about_the_others(tmp_path):
     body = {"name": "axes", "spacecraft": {"inertia": [2, 3, 4]}, "initial": {"attitude": [1, 0, 0, 0]}}
     law = {"file": "two_axes.py", "k_rate": 0.3, "k_attitude": 0.1}
     whole = sh.scenario({**body, "simulation": {"duration": 1.0}, "law": [law]}, tmp_path)
-    with pytest.warns(UserWarning, match="size 1, so the loop is not stable and has no margins"):
+    with pytest.warns(UserWarning, match="magnitude 1, so the loop is not stable and has no margins"):
         found = sh.margins(whole)
     assert np.isnan(found[2].crossover)
     assert found[0].crossover > found[1].crossover > 0.0
@@ -56,7 +56,7 @@ def test_a_law_that_leaves_an_axis_alone_has_margins_about_the_others(tmp_path):
 
 def test_margins_of_an_unstable_loop_are_nan_with_a_reason():
     with pytest.warns(
-        UserWarning, match=r"law sliding: a pole of a step of the linear loop has size 1\.\d+, so the loop is not"
+        UserWarning, match=r"law sliding: a pole of the sampled linear loop has magnitude 1\.\d+, so the loop is not"
     ):
         found = sh.margins("cubesat-slew", "sliding", 0.25)
     assert all(np.isnan(about.gain) for about in found)

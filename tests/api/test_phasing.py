@@ -114,10 +114,10 @@ def test_the_sheet_of_a_cubesat_has_every_sensor_and_actuator():
 def test_a_loop_without_sensors_says_so():
     shown = sh.phasing("three-laws")
     assert shown.outcome == "met"
-    assert shown.sheet.notes == ["The loop has no sensors: the law is given the state as it is."]
+    assert shown.sheet.notes == ["The loop has no sensors: the law is given the true state."]
     assert {cell.stage for cell in shown.sheet.cells} == {"lyapunov: command", "actuators: torque on the body"}
     quiet = sheet_of("cubesat-detumble")
-    assert quiet.notes == ["b-dot: this law asks for nothing at its first instant; the sheet begins with a torque."]
+    assert quiet.notes == ["b-dot: this law commands nothing at its first instant; the sheet begins with a torque."]
 
 
 @pytest.mark.slow

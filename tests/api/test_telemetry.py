@@ -127,7 +127,7 @@ def test_what_does_not_fit_is_refused(tmp_path):
         ("gyro_rate", "giro_rate", ("giro_rate", "gyro_rate")),
         ('"wy", ', "", ("2 columns", "3 for gyro_rate")),
         ("[[0, 1, 0]", "[[0, 2, 0]", ("gyro_rate.axes", "orthogonal")),
-        ('unit = "deg/s"', 'scalar = "last"', ("gyro_rate", "no quaternion")),
+        ('unit = "deg/s"', 'scalar = "last"', ("gyro_rate", "not a quaternion")),
         ("separator", "divider", ("divider", "unknown key")),
     ):
         (tmp_path / "bad.toml").write_text(MAPPING.format(base="run", unit="s").replace(old, new, 1))

@@ -89,7 +89,7 @@ def test_a_killed_worker_of_a_cluster_leaves_its_blocks_to_the_others(tmp_path, 
 def test_without_any_worker_left_the_campaign_ends_and_can_be_resumed(tmp_path, store, trail, expected):
     with cluster(tmp_path) as (address, _, _):
         _, progress = kill_worker_once(trail)
-        with pytest.raises(InputError, match=r"no worker for 1 s; what was flown is kept, --resume continues from there$"):
+        with pytest.raises(InputError, match=r"no worker for 1 s; the runs flown are kept, --resume continues from there$"):
             fly(store, Scheduler(address, patience=1.0), Toy(0.2, trail), progress)
     assert 1 <= len(chunks(store.folder)) < 14
     assert resumed(store) == expected
@@ -105,7 +105,7 @@ def test_a_killed_scheduler_ends_the_campaign_which_can_be_resumed(tmp_path, sto
             scheduler.kill()
 
         with pytest.raises(
-            InputError, match=r"^tcp://.*does not answer; what was flown is kept, --resume continues from there$"
+            InputError, match=r"^tcp://.*does not answer; the runs flown are kept, --resume continues from there$"
         ):
             fly(store, Scheduler(address), Toy(0.2), progress)
         assert time.monotonic() - started[0] < 15.0

@@ -81,12 +81,12 @@ def cut(chunk):
 
 FAULTS = {
     "has another bit": r"other numbers in run 32 of pd \(flown.pd\)",
-    "raises": r"process \d+ on .*: failed in runs 32 to 47 of pd: TypeError: no number; what was flown is kept",
+    "raises": r"process \d+ on .*: failed in runs 32 to 47 of pd: TypeError: no number; the runs flown are kept",
     "ends": "a block ended all workers that tried it",
-    "is something else": r"process \d+ on .*: found something else than runs 32 to 47 of pd; allowed: what",
-    "is of other runs": "something else than runs 32 to 47 of pd",
-    "has other columns": "something else than runs 32 to 47 of pd",
-    "is cut": "something else than runs 32 to 47 of pd",
+    "is something else": r"process \d+ on .*: found a result that is not of runs 32 to 47 of pd; allowed: the",
+    "is of other runs": "a result that is not of runs 32 to 47 of pd",
+    "has other columns": "a result that is not of runs 32 to 47 of pd",
+    "is cut": "a result that is not of runs 32 to 47 of pd",
 }
 
 

@@ -111,7 +111,7 @@ def test_other_bits_are_refused(run, driver, monkeypatch):
     ("name", "result", "words"),
     [
         ("cuInit", (100,), "gpu: found no driver that works (cuInit: 100); allowed: an NVIDIA GPU from sm_80 on"),
-        ("cuMemAlloc", (2, 0), "gpu: found cuMemAlloc: 2; allowed: a GPU that works"),
+        ("cuMemAlloc", (2, 0), "gpu: found cuMemAlloc: 2; allowed: a working GPU"),
         ("cuModuleLoadData", (218, None), "gpu: found cuModuleLoadData: 218"),
         ("cuLaunchKernel", (700,), "gpu: found cuLaunchKernel: 700"),
     ],

@@ -133,7 +133,7 @@ def test_the_verdict_says_what_the_law_knows():
         ({"initial.rate[1]": LIMIT | {"known_to_law": True}}, "false, because no law receives it"),
         (
             {"fault[1].inertia": INERTIA | {"known_to_law": True}},
-            "false, because the action on a fault says what laws learn about it",
+            "false, because the action on a fault determines what laws learn about it",
         ),
     ],
 )

@@ -143,7 +143,7 @@ def test_a_false_claim_is_contradicted(tmp_path, monkeypatch):
     (tmp_path / "s.toml").write_text(scenario.text)
     told = starhold("campaign", "s.toml", "-o", "d", "--threads", "1", "--proof", cwd=tmp_path)
     assert told.returncode == INTERNAL_ERROR
-    assert "fault of starhold" in " ".join(told.stdout.split())
+    assert "error in starhold" in " ".join(told.stdout.split())
     assert "Proved of the loop as it flies" in (tmp_path / "d" / "report.html").read_text()
 
 

@@ -92,8 +92,8 @@ def test_sobol_refuses_with_a_reason():
     assert "at least two are needed" in sobol(NAMES, unit[:8], ishigami(unit[:8])).reason
     shuffled = np.random.default_rng(0).permutation(unit)
     for other in (shuffled, unit[:511], unit[:0]):
-        assert "no Saltelli design" in sobol(NAMES, other, ishigami(other)).reason
-    assert "no Saltelli design" in sobol((), unit[:, :0], values).reason
+        assert "not a Saltelli design" in sobol(NAMES, other, ishigami(other)).reason
+    assert "not a Saltelli design" in sobol((), unit[:, :0], values).reason
 
 
 @pytest.mark.parametrize("levels", [2, 4, 6, 10])
@@ -155,6 +155,6 @@ def test_morris_refuses_other_designs():
         np.zeros((8, 3)),
         np.random.default_rng(0).uniform(size=(8, 3)),
     ):
-        assert "no Morris design" in morris(NAMES, design, ishigami(design)).reason
+        assert "not a Morris design" in morris(NAMES, design, ishigami(design)).reason
     # Ends of the unit interval may be drawn in a little, as where a distribution has no ends.
     assert isinstance(morris(NAMES, 0.001 + 0.998 * unit, ishigami(unit)), Morris)

@@ -106,7 +106,7 @@ REFUSED = {
     "fault.time": "fault[1].KEY",
     "fault[1].time": "[[fault]]",
     "law.pid.k_rate": "mpc",
-    "law.lyapunov.type": "says what a table is",
+    "law.lyapunov.type": "determines the kind of a table",
     "simulation.duration": "all runs share",
     "transient.rate": "no [transient] table",
     "initial.rate[4]": "1 to 3",

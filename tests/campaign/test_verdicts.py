@@ -170,7 +170,7 @@ def test_draws_that_depend_give_no_confidence():
     bounds = (verdict.lower, verdict.upper, verdict.allowed, verdict.more, verdict.margin_bound)
     assert bounds == (None,) * 5
     assert verdict.observed == pytest.approx(0.9997)
-    assert "99.97 % keep it" in verdict.sentence()
+    assert "99.97 % meet it" in verdict.sentence()
     assert "no confidence" in verdict.sentence()
     assert all(part.lower is None and part.outcome == "not decided" for part in verdict.parts)
 

@@ -86,8 +86,8 @@ def test_a_flight_beyond_what_is_proved_is_told_as_a_fault_of_starhold(tmp_path,
     (tmp_path / "s.toml").write_text(with_campaign(short(), {"over": RATE, "requirement": [PEAK], "runs": 4}).text)
     told = starhold("campaign", "s.toml", "-o", "d", "--threads", "1", cwd=tmp_path)
     assert told.returncode == INTERNAL_ERROR
-    assert "fault of starhold" in " ".join(told.stdout.split())
-    assert "fault of starhold" in (tmp_path / "d" / "report.html").read_text()
+    assert "error in starhold" in " ".join(told.stdout.split())
+    assert "error in starhold" in (tmp_path / "d" / "report.html").read_text()
 
 
 def test_the_search_tells_how_many_of_its_flights_are_done(brief):

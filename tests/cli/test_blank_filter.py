@@ -29,7 +29,7 @@ def test_a_filter_without_numbers_is_told_where_no_mode_fails_by_it(tmp_path):
     path = tmp_path / "mission.toml"
     path.write_text(text[: text.index("[[law]]")] + PARTS + MODES)
     done = CliRunner().invoke(app, ["run", str(path), "-o", str(tmp_path / "out"), "--no-certify"])
-    said = "mission: no number to the end: blank_rate from 0 s on"
+    said = "mission: not finite up to the end: blank_rate from 0 s on"
     assert done.exit_code == 0
     assert said in " ".join(done.stdout.split())
     assert said in (tmp_path / "out" / "report.html").read_text()

@@ -222,7 +222,7 @@ def test_warnings_and_failures_of_the_system_are_single_lines(short):
 @pytest.mark.parametrize(
     ("failure", "said"),
     [
-        (MemoryError(), "starhold: not enough memory; simulation.record_every"),
+        (MemoryError(), "starhold: not enough memory; a larger simulation.record_every"),
         (OSError(28, "No space left on device", "out/run.nc"), "starhold: out/run.nc: No space left on device"),
     ],
 )
@@ -255,7 +255,7 @@ def test_what_ends_a_command_leaves_nothing_half_written(number, short):
     child.send_signal(number)
     _, said = child.communicate(timeout=60)
     assert child.returncode == 128 + number
-    assert said.endswith("starhold: interrupted; files already written are whole\n")
+    assert said.endswith("starhold: interrupted; files already written are complete\n")
     assert "Traceback" not in said
     assert os.listdir(short / "out") == []
 

@@ -101,7 +101,7 @@ def test_a_law_leaves_and_flies_in_a_process(tmp_path):
     assert "The commands came from ./flight: nothing is proved about it." in done.stdout
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "commands from ./flight" in page
-    assert f"What is flown again in this page is commanded by the file&#x27;s law {name}, not by ./flight." in page
+    assert f"Flights in this page are commanded by the file&#x27;s law {name}, not by ./flight." in page
     assert not (tmp_path / "out" / "certificate.json").exists()
     whole = sh.simulate("three-laws")
     with xr.open_dataset(tmp_path / "out" / "run.nc", engine="h5netcdf") as run:

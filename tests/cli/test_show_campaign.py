@@ -61,7 +61,7 @@ def test_few_drivers_of_a_kind_are_printed_and_the_rest_is_counted(printed: Any,
     left = sum(max(0, len(kind) - 1) for kind in kinds)
     assert left > 1
     text = printed(lambda: print_campaign(made, "rigid-body"), width=400)
-    assert f"{left} weaker ones that stand out as well" in text
+    assert f"{left} weaker significant drivers not listed" in text
     low, high = kinds[0][0].range
     assert f"nine in ten failed runs from {low:.4g} to {high:.4g}; greater than in a passed run" in text
     together = kinds[1][0]

@@ -73,7 +73,7 @@ def test_a_flight_begins_between_the_states_and_says_how_far_it_comes(run, tmp_p
     message = (tmp_path / "own.oem").read_text()
     orbit = 'oem = "own.oem"\nepoch = "2027-03-20T12:03:25Z"\n'
     with pytest.warns(
-        UserWarning, match=r"two-body motion from its state comes to lie .* km from the ephemeris in 995 s, where"
+        UserWarning, match=r"two-body motion from this state departs by .* km from the ephemeris in 995 s, where"
     ):
         scenario = flies(tmp_path, message, orbit)
 
@@ -83,10 +83,10 @@ def test_a_flight_begins_between_the_states_and_says_how_far_it_comes(run, tmp_p
     assert np.abs(np.concatenate(scenario.table.orbit.start) - there)[:3].max() < 2e-2
     with pytest.warns(UserWarning, match="orbit.oem") as said:
         again = flies(tmp_path, message, orbit + '[[part]]\ntype = "oblateness"\n')
-    assert len([one for one in said if "oblateness from its state comes to lie" in str(one.message)]) == 1
+    assert len([one for one in said if "oblateness from this state departs by" in str(one.message)]) == 1
     both = sh.simulate(again)
     assert "from the ephemeris" in str(said[0].message)
-    far = float(str(said[0].message).split(" lie ")[1].split()[0])
+    far = float(str(said[0].message).split(" departs by ")[1].split()[0])
     times = both["time"].to_numpy()
     inside = times <= 995.0
     old = orbited(*begun, times[inside] + 205.0)[:, :3]

@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 
 from tests.kernel.driven import Driven
 from tests.kernel.flights import Fleet, Surroundings, cross, rates, stepped, turn
+from tests.kernel.planned import Planned
 from tests.kernel.programs import number, run, written
 
 STEP = 1e-6
@@ -40,7 +41,8 @@ class Oracle(Driven):
         if "near the inertia" in claim["theorem"]:
             self.J = self.near(self.J)
         self.true = self.near(self.J) if claim["theorem"] == "points" and "tolerance" in self.numbers else self.J
-        self.words = claim["taken"]
+        # How much is in a memory.
+        self.words, self.kept = claim["taken"], 0.0
 
     def near(self, J):
         """An inertia no entry of which is off by more than is told."""
@@ -73,6 +75,8 @@ class Oracle(Driven):
         given = dict(self.subject)
         for field, value in told.items():
             given |= {f"measurement.{field}.{k}": x for k, x in enumerate(value)}
+        kept = [name for name in self.programs["law"]["inputs"] if name.startswith("memory.")]
+        given |= {name: self.rng.choice([-1.0, 1.0], np.shape(w)[1:]) * self.kept for name in kept}
         return given, h
 
     @cached_property
@@ -84,7 +88,7 @@ class Oracle(Driven):
 
     def law(self, q, w, e, r, a, H):
         given, h = self.inputs(q, w, e, r, a, H)
-        u = run(self.programs["law"], given)
+        u = run(self.programs["law"], given)[:3]
         return u, u + e - np.cross(w + r, self.J @ (w + r) + h) - self.J @ (a - cross(w, r)), h
 
     def lyapunov(self, q, w):
@@ -226,7 +230,7 @@ class Oracle(Driven):
             return True
         if level is not None and self.lyapunov(other, zero) - V0 > level:
             return True
-        return all(self.lyapunov(other, zero) > self.lyapunov(turned(self.rng), zero) for _ in range(30))
+        return level is None or all(self.lyapunov(other, zero) > self.lyapunov(turned(self.rng), zero) for _ in range(30))
 
     def contents(self, V0, level):
         n, zero = self.numbers, np.zeros(3)
@@ -290,12 +294,16 @@ class Oracle(Driven):
             if (most > radii).any(axis=0).mean() > n["share"] + 4 * math.sqrt(n["share"] / 500):
                 return False
 
-        def law(q, w, *around):
-            return run(self.programs["law"], self.inputs(q, w, *(around or [np.zeros(w.shape)] * 4))[0])
+        if "plan" in self.words and not self.plans(tries):
+            return False
 
-        _, stiffness = self.linear()
+        def law(q, w, *around):
+            return run(self.programs["law"], self.inputs(q, w, *(around or [np.zeros(w.shape)] * 4))[0])[:3]
+
+        (_, stiffness), self.kept = self.linear(), 1e9
         slow = math.sqrt(np.linalg.eigvals(np.linalg.solve(self.J, stiffness)).real.min() / 2)
-        fleet = Fleet(self.J, law, n["period"], n["outside"], n["error"], slow, int(self.rng.integers(1000)), 2 * tries)
+        errors = n["error"] + n.get("plan.error", 0.0)
+        fleet = Fleet(self.true, law, n["period"], n["outside"], errors, slow, int(self.rng.integers(1000)), 2 * tries)
         fleet.around = Surroundings(
             [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
             n.get("momentum") if "wheels" in self.words else None,
@@ -317,6 +325,13 @@ class Oracle(Driven):
             if k * n["period"] > n["settling"] and off.any():
                 return False
         return self.contents(V0, level)
+
+    def plans(self, tries):
+        """Whether no best plan is against what is claimed of it."""
+        states = [self.border(0.0, self.numbers["level"] * self.rng.uniform()) for _ in range(tries)]
+        q, w = (np.array(part).T for part in zip(*states, strict=True))
+        told, _ = self.inputs(q, w, *[np.zeros(w.shape)] * 4)
+        return Planned(self.subject, self.numbers, self.J).holds(run(self.programs["law"], told)[:3], q, w, self.rng)
 
     def border(self, V0, rest):
         """A state of the set's border, of which rest is the part of V that it has at rest."""

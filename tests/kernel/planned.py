@@ -21,6 +21,7 @@ class Planned:
         self.R = np.diag([subject[f"plan.command.{k}"] for k in range(3)])
         self.P = np.array([[subject[f"plan.end.{min(i, k)}.{max(i, k)}"] for k in range(6)] for i in range(6)])
         self.axis, self.norm = (subject.get(f"plan.{name}", math.inf) for name in ("limit", "limit.norm"))
+        self.error = numbers["plan.error"]
         moments = np.linalg.eigvalsh(J)
         self.strength = numbers["plan.stiffness"] / max(moments[-1] - moments[0], 1e-12 * moments[-1])
 
@@ -64,3 +65,12 @@ class Planned:
         """How much more than its limit a plan asks for, as a share: not above 1 where it keeps it."""
         axis, size = np.abs(torques).max() / self.axis, np.linalg.norm(torques, axis=1).max() / self.norm
         return max(axis, size)
+
+    def holds(self, program, q, w, rng):
+        """Whether the best plans keep their limits, and are as near the torque of a program as is claimed."""
+        if not (min(np.diag(self.Q)) >= 0.0 and min(np.diag(self.R)) > 0.0 and np.linalg.eigvalsh(self.P)[0] > -1e-9):
+            return False
+        n = rng.normal(size=w.shape)
+        torques = self.torques(q, w, n / np.linalg.norm(n, axis=0), 0.0)
+        off = np.linalg.norm(torques[0] - program, axis=0)
+        return self.exceeded(torques) <= 1.0 + 1e-9 and bool((off <= self.error).all())

@@ -1,13 +1,58 @@
 """Flights of loops with appendages, in floats, steered against every bound of a certificate's evidence."""
 
+import json
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 
+import starhold as sh
+from starhold.certification.evidence import appendages
+from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.finding import certificate
+from starhold.certification.subject import make_subject
 from starhold.kernel.numbers import rational
+from starhold.scenario.building import build
+from starhold.scenario.reading import make_scenario
 from tests.kernel.programs import run, written
 
+MOMENTS, MODES = [20.0, 30.0, 25.0], [[1.2, 0.01, 1.5, 0.2, 0.0, 0.0], [2.6, 0.01, 0.0, 1.0, 1.4, 0.0]]
+BENDING = {
+    "spacecraft": {"inertia": MOMENTS, "torque_limit": "0.5 N m"},
+    "initial": {"angles": [0, 0, "1 deg"]},
+    "target": {"mode": "inertial", "attitude": [1, 0, 0, 0]},
+    "simulation": {"duration": "2 min", "control_period": 0.1},
+    "part": [{"type": "flexible-modes", "modes": MODES}],
+    "law": [{"type": "lyapunov", "k_rate": 8.0, "k_attitude": 3.0}],
+}
+TELLING = [
+    {"type": "gyro", "bias": [2e-5, -1e-5, 1e-5]},
+    {"type": "star-tracker", "cross": 0, "roll": 0, "mounting_error": [1e-4, 0, 0]},
+    {"type": "constant-torque", "torque": [1e-4, 2e-4, -1e-4]},
+]
+BIASED = BENDING | {"part": [*BENDING["part"], *TELLING]}
 SUBSTEPS = 1
+
+
+@cache
+def loop_of(name):
+    if name == "panels":
+        scenario = sh.load("flexible-slew")
+        return build(scenario, scenario.laws[0])
+    scenario = make_scenario({"name": "bending", **{"bent": BENDING, "biased": BIASED}[name]})
+    return build(scenario, scenario.laws[0])
+
+
+def found(loop):
+    """The certificate of the claim that is found."""
+    recorded = Loop(make_subject(loop))
+    assert appendages.find_appended(recorded), recorded.failed
+    return json.loads(json.dumps(certificate(recorded.programs, recorded.claims)))
+
+
+@cache
+def content_of(name):
+    return found(loop_of(name))
 
 
 def columns(programs, claim, role):
@@ -20,7 +65,9 @@ class Swaying:
     def __init__(self, content, seed=1, lanes=64):
         (claim,) = content["claims"]
         self.claim, self.rng, self.lanes = claim, np.random.default_rng(seed), lanes
-        self.motion, self.law = (columns(content["programs"], claim, role) for role in ("motion", "law"))
+        self.motion, self.law, self.turning = (
+            columns(content["programs"], claim, role) for role in ("motion", "law", "turning")
+        )
         self.numbers = {name: float(Fraction(x)) for name, x in claim["numbers"].items()}
         self.subject = {name: float(rational(x)) for name, x in claim["subject"].items()}
         self.count = len(self.motion["outputs"]) - 3
@@ -31,11 +78,12 @@ class Swaying:
 
     def rates(self, x, torque):
         """The derivatives of (q0, q, w, v)."""
-        q0, q, w, v = x[0], x[1:4], x[4:7], x[7:]
+        q0, w, v = x[0], x[4:7], x[7:]
         given = {f"rate.{k}": w[k] for k in range(3)} | {f"torque.{k}": torque[k] for k in range(3)}
         given |= {f"state.{k}": v[k] for k in range(self.count)}
         moved = np.array([np.broadcast_to(y, q0.shape) for y in run(self.motion, given)])
-        turned = 0.5 * np.vstack([-(q * w).sum(0), q0 * w + np.cross(q.T, w.T).T])
+        given = {f"rate.{k}": w[k] for k in range(3)} | {f"q.{k}": x[k] for k in range(4)}
+        turned = np.array([np.broadcast_to(y, q0.shape) for y in run(self.turning, given)])
         return np.vstack([turned, moved])
 
     def command(self, q, w):
@@ -153,6 +201,21 @@ class Swaying:
                         note("rate", np.linalg.norm(x[4:7], axis=0) / self.numbers["end.rate"])
                 n += 1
         return found | {"flown": n}
+
+    def holds(self, seconds=60.0):
+        """Whether no flight is against what the claim says of V, torques and the end, nor the set without what it holds."""
+        reached = self.against(min(seconds, 1.2 * self.numbers["settling"] + 20.0 * self.h))
+        said = max(reached.get(name, 0.0) for name in ("V", "limit", "limit.norm", "angle", "rate"))
+        return said <= 1.0 + 1e-6 and self.contains()
+
+    def contains(self):
+        """Whether the set holds the turns at rest and the rates on target that are told."""
+        axis, n = self.rng.normal(size=(3, 200)), self.numbers
+        axis, none = axis / np.linalg.norm(axis, axis=0), np.zeros((200, self.count))
+        turned, moving = axis * np.sin(n.get("angle", 0.0) / 2), axis * n.get("rate", 0.0)
+        pairs = [(turned, 0.0 * axis), (0.0 * axis, moving)]
+        pairs += [(axis * np.sin(n["start.angle"] / 2), axis[::-1] * n["start.rate"])] if "start.rate" in n else []
+        return all((self.energy(self.state(np.vstack([w, q]).T, none)) <= n["level"] * (1 + 1e-9)).all() for q, w in pairs)
 
     def told(self, x):
         """What the law is told, with errors of the largest size in some directions."""

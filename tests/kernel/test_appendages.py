@@ -10,62 +10,22 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import starhold as sh
 from starhold.analysis.departure import departures, start_inside
 from starhold.certification.appendages import appended_motion
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.evidence import appendages
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.finding import certificate
 from starhold.certification.subject import make_subject
 from starhold.kernel import appended
 from starhold.kernel.check import check
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.programs import Program, digest
 from starhold.kernel.taylor import ONE, run, within
-from starhold.scenario.building import build
-from starhold.scenario.reading import make_scenario
 from starhold.simulation.lane import fly, label
 from tests.kernel.programs import run as run_in_floats
-from tests.kernel.swaying import Swaying
+from tests.kernel.swaying import MODES, MOMENTS, Swaying, content_of, found, loop_of
 
-J, MODES = [20.0, 30.0, 25.0], [[1.2, 0.01, 1.5, 0.2, 0.0, 0.0], [2.6, 0.01, 0.0, 1.0, 1.4, 0.0]]
-BENDING = {
-    "spacecraft": {"inertia": J, "torque_limit": "0.5 N m"},
-    "initial": {"angles": [0, 0, "1 deg"]},
-    "target": {"mode": "inertial", "attitude": [1, 0, 0, 0]},
-    "simulation": {"duration": "2 min", "control_period": 0.1},
-    "part": [{"type": "flexible-modes", "modes": MODES}],
-    "law": [{"type": "lyapunov", "k_rate": 8.0, "k_attitude": 3.0}],
-}
-TELLING = [
-    {"type": "gyro", "bias": [2e-5, -1e-5, 1e-5]},
-    {"type": "star-tracker", "cross": 0, "roll": 0, "mounting_error": [1e-4, 0, 0]},
-    {"type": "constant-torque", "torque": [1e-4, 2e-4, -1e-4]},
-]
-BIASED = BENDING | {"part": [*BENDING["part"], *TELLING]}
 MOST = 1.0 + 1e-6
-
-
-@cache
-def loop_of(name):
-    if name == "panels":
-        scenario = sh.load("flexible-slew")
-        return build(scenario, scenario.laws[0])
-    scenario = make_scenario({"name": "bending", **{"bent": BENDING, "biased": BIASED}[name]})
-    return build(scenario, scenario.laws[0])
-
-
-def found(loop):
-    """The certificate of the claim that is found."""
-    recorded = Loop(make_subject(loop))
-    assert appendages.find_appended(recorded), recorded.failed
-    return json.loads(json.dumps(certificate(recorded.programs, recorded.claims)))
-
-
-@cache
-def content_of(name):
-    return found(loop_of(name))
 
 
 @cache
@@ -121,10 +81,10 @@ def test_the_claim_has_all_parts_of_the_loop_in_it():
 def test_own_equations_move_as_the_program():
     program, random = appended_motion(loop_of("bent")), np.random.default_rng(1)
     D, f = np.array(MODES)[:, 2:5], np.array(MODES)[:, 0]
-    M = np.block([[np.diag(J), D.T], [D, np.eye(2)]])
+    M = np.block([[np.diag(MOMENTS), D.T], [D, np.eye(2)]])
     for _ in range(5):
         w, x, v, u = (random.normal(size=n) for n in (3, 2, 2, 3))
-        load = u - np.cross(w, np.array(J) * w + D.T @ v)
+        load = u - np.cross(w, np.array(MOMENTS) * w + D.T @ v)
         own = np.linalg.solve(M, [*load, *(-0.02 * f * v - f * f * x)])
         given = {f"rate.{k}": y for k, y in enumerate(w)} | {f"torque.{k}": y for k, y in enumerate(u)}
         given |= {f"state.{k}": y for k, y in enumerate([*x, *v])}
@@ -136,11 +96,11 @@ def test_flights_by_scipy_and_by_starhold_stay_within_the_claim():
     against = Swaying(content, 3, 4)
     begun, n = against.starts(), against.numbers
     D, f = np.array(MODES)[:, 2:5], np.array(MODES)[:, 0]
-    M = np.block([[np.diag(J), D.T], [D, np.eye(2)]])
+    M = np.block([[np.diag(MOMENTS), D.T], [D, np.eye(2)]])
 
     def slope(t, y, u):
         q0, q, w, x, v = y[0], y[1:4], y[4:7], y[7:9], y[9:]
-        moved = np.linalg.solve(M, [*(u - np.cross(w, np.array(J) * w + D.T @ v)), *(-0.02 * f * v - f * f * x)])
+        moved = np.linalg.solve(M, [*(u - np.cross(w, np.array(MOMENTS) * w + D.T @ v)), *(-0.02 * f * v - f * f * x)])
         return [-0.5 * q @ w, *(0.5 * (q0 * w + np.cross(q, w))), *moved[:3], *v, *moved[3:]]
 
     for y in begun.T:

@@ -149,8 +149,8 @@ def drifting(measurement, gains, craft, memory):
     return add(torque, scale(1e-5 * divide(1.0, dot(field, field)), cross((1.0, 0.0, 0.0), field))), memory
 
 
-@pytest.mark.parametrize("law", [along, stale, idle, undivided, switching, drifting])
-def test_a_law_that_does_something_else_is_refused_and_breaks_the_claim(law):
+def with_law(law):
+    """The certificate about another law."""
     content = copy.deepcopy(tumbling())
     (claim,) = content["claims"]
     gains, craft = b_dot.examples()[0], None
@@ -159,9 +159,33 @@ def test_a_law_that_does_something_else_is_refused_and_breaks_the_claim(law):
     del content["programs"][claim["programs"]["law"]]
     content["programs"][digest(program)] = program
     claim["programs"]["law"] = digest(program)
+    return content
+
+
+@pytest.mark.parametrize("law", [along, stale, idle, undivided, switching, drifting])
+def test_a_law_that_does_something_else_is_refused_and_breaks_the_claim(law):
+    content = with_law(law)
     assert not flown(content).holds()
     with pytest.raises(RefusedError):
         check(text(content))
+
+
+def led(measurement, gains, craft, memory):
+    """Does more where the target moves, of which the claim says nothing."""
+    torque, memory = b_dot.torque(measurement, gains, craft, memory)
+    return add(torque, scale(1e-3, measurement.target_rate)), memory
+
+
+def told_of(measurement, gains, craft, memory):
+    torque, memory = b_dot.torque(measurement, gains, craft, memory)
+    return add(torque, scale(1e3, measurement.external_torque)), memory
+
+
+@pytest.mark.parametrize("law", [led, told_of])
+def test_a_law_that_is_told_of_more_than_the_field_is_refused(law):
+    """Where nothing is told of it is the law of the claim, and the claim does not assume that."""
+    with pytest.raises(RefusedError, match="told of more than the field"):
+        check(text(with_law(law)))
 
 
 def test_nothing_false_is_accepted():

@@ -1,6 +1,7 @@
 """Claims about the loop that flies of laws that keep a memory: whatever is in it, it adds a bounded torque."""
 
 import copy
+import random
 from functools import cache
 from types import SimpleNamespace
 
@@ -24,7 +25,10 @@ from starhold.parts.craft import make_craft
 from starhold.scenario.building import build
 from starhold.trace.straight_line import straight_line
 from tests.kernel.certificates import failing, text
+from tests.kernel.mutations import refusals
+from tests.kernel.oracle import Oracle
 from tests.laws.motion import fly
+from tests.tiers import fewer
 
 GAINS = pid.Gains(0.36, 0.036, 8e-4, 2e-4)
 MOMENTS, OUTSIDE, PERIOD = [2.0, 3.0, 4.0], 1e-4, 0.5
@@ -128,3 +132,12 @@ def test_a_law_with_a_memory_is_told_to_have_one():
     content["claims"][0]["taken"].remove("memory")
     with pytest.raises(RefusedError, match="asks for memory"):
         check(text(content))
+
+
+@pytest.mark.slow
+def test_nothing_false_is_accepted():
+    def true(content, claim):
+        return Oracle(content, claim).holds(12)
+
+    count = fewer(100)
+    assert refusals(pointing(), random.Random(7), count, true) > count / 2

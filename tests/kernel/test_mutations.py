@@ -30,12 +30,14 @@ SUITES = {
     "norm": ("by hand", "norm", 1),
     "points": ("flying", "cubesat", 0),
     "points in noise": ("flying", "noisy", 0),
+    "points in random torques": ("flying", "shaken", 0),
+    "points at what moves": ("flying", "moving", 0),
     "evenly": ("wheels-orbital", "wheel", 0),
     "evenly whatever the inertia": ("wheels-orbital", "wheel", 2),
     "wheels": ("wheels-orbital", "wheel", 1),
 }
 COUNT = 400 if WHOLE else 25
-"""Mutations of each certificate: 5 600 in all."""
+"""Mutations of each certificate: 9 600 in all."""
 SLOW = {name for name in SUITES if name.startswith(("evenly", "wheels", "points", "jumps", "whatever", "falls"))}
 
 

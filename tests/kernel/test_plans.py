@@ -3,6 +3,7 @@
 import copy
 import json
 import math
+import random
 import time
 from dataclasses import replace
 from functools import cache
@@ -25,10 +26,12 @@ from starhold.laws import mpc
 from starhold.laws.interface import Measurement
 from starhold.parts.craft import make_craft
 from starhold.scenario.building import build
-from tests.kernel.certificates import rekeyed, text
+from tests.kernel.certificates import failing, rekeyed, text
+from tests.kernel.mutations import refusals
 from tests.kernel.oracle import Oracle
 from tests.kernel.planned import Planned, skew
 from tests.kernel.programs import number
+from tests.tiers import fewer
 
 
 @cache
@@ -286,6 +289,22 @@ def test_what_is_not_so_is_refused(what):
         check(text(content))
 
 
+HYPOTHESES = {
+    "error of the plan": scaled("numbers", "plan.error", rational("1/1000")),
+    "moves within the limit": scaled("subject", "plan.limit", rational("1/5")),
+}
+
+
+@pytest.mark.parametrize("hypothesis", HYPOTHESES)
+def test_only_this_hypothesis_fails_and_best_plans_contradict_the_claim(hypothesis):
+    content = content_of()
+    (claim,) = content["claims"]
+    assert Oracle(content, claim).plans(100)
+    HYPOTHESES[hypothesis](claim)
+    assert failing(claim, content["programs"]) == {hypothesis}
+    assert not Oracle(content, claim).plans(100)
+
+
 @pytest.mark.parametrize("theorem", ["converges", "converges strictly"])
 def test_no_other_theorem_takes_a_plan(theorem):
     content = content_of()
@@ -337,3 +356,12 @@ def test_the_program_may_be_another_one_only_with_its_moves():
     constant[1] = str(rational(constant[1]) * rational("1001/1000"))
     with pytest.raises(RefusedError, match="not the first move"):
         check(json.dumps(rekeyed(content)))
+
+
+@pytest.mark.slow
+def test_nothing_false_is_accepted():
+    def true(content, claim):
+        return Oracle(content, claim).holds(12)
+
+    count = fewer(100)
+    assert refusals(content_of(), random.Random(7), count, true) > count / 2

@@ -1,6 +1,7 @@
 """The claim about the loop that flies with an inertia near the given one: what that adds is a torque from outside."""
 
 import copy
+import random
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -26,8 +27,11 @@ from starhold.kernel.regions import RATE, TURN
 from starhold.parts.craft import tensor
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.scenario.building import build
-from tests.kernel.certificates import text
+from tests.kernel.certificates import rekeyed, text
 from tests.kernel.flights import along, moved
+from tests.kernel.mutations import refusals
+from tests.kernel.oracle import Oracle
+from tests.tiers import fewer
 
 MOMENTS, TOLERANCE, FAR, OUTSIDE = [2.0, 3.0, 4.0], 0.03, 0.08, 1e-5
 LAW = {"type": "lyapunov", "k_rate": 0.5, "k_attitude": 0.05}
@@ -67,6 +71,17 @@ def test_a_larger_tolerance_needs_another_proof(share):
     worse["claims"][0]["numbers"]["tolerance"] = str(Fraction(TOLERANCE) * Fraction(share))
     with pytest.raises(RefusedError, match="the inertia is known too badly" if share > 5.0 else None):
         check(text(worse))
+
+
+def test_a_law_that_does_nothing_is_refused():
+    """What the inertia adds to a linear acceleration is nothing where there is none."""
+    content = copy.deepcopy(pointing())
+    (claim,) = content["claims"]
+    program = content["programs"][claim["programs"]["law"]]
+    program["steps"].append(["constant", "0"])
+    program["outputs"] = [len(program["inputs"]) + len(program["steps"]) - 1] * 3
+    with pytest.raises(RefusedError, match="V decreases by a share"):
+        check(text(rekeyed(content)))
 
 
 def held(tolerance):
@@ -158,3 +173,12 @@ def test_a_wanted_tolerance_is_in_the_claim_and_left_out_by_name_where_nothing_i
     assert differences(proof, pulled) == []
     less = proof | {"numbers": proof["numbers"] | {"outside": str(rational(proof["numbers"]["outside"]) * Fraction(9, 10))}}
     assert differences(less, pulled) == ["outside is exceeded"]
+
+
+@pytest.mark.slow
+def test_nothing_false_is_accepted():
+    def true(content, claim):
+        return Oracle(content, claim).holds(12)
+
+    count = fewer(100)
+    assert refusals(pointing(), random.Random(7), count, true) > count / 2

@@ -142,7 +142,7 @@ def test_a_dipole_on_wheels_is_refused(law):
     tables = replaced(flown, rods, WHEELS)
     for text_of, where in ((own, f"law {law}"), (MODES, "law modes, mode detumble")):
         scenario = parse(tables + text_of, "mine.toml")
-        with refused(" with wheels, which keep the momentum", start=f"mine.toml: {where}: found "):
+        with refused(" with wheels, which store the momentum", start=f"mine.toml: {where}: found "):
             build(scenario, scenario.laws[0])
     # A torque that nothing is said of may come from outside, as that of rods does.
     for parts in (flown, flown.replace(rods, "")):

@@ -79,7 +79,7 @@ ROW = {"name": "r", "where": "here", "says": "so", "by": "metric", "verdict": "h
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"verdict": "differs", "published": "1"}, "wants a `why`"),
+        ({"verdict": "differs", "published": "1"}, "needs a `why`"),
         ({"verdict": "agrees"}, "goes with a printed number"),
         ({"published": "1"}, "goes with no printed number"),
         ({"verdict": "perhaps"}, "verdict"),

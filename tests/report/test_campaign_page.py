@@ -232,16 +232,16 @@ def test_wide_ranges_are_drawn_on_logarithmic_scales() -> None:
 @pytest.mark.parametrize(
     ("failures", "share", "independent", "stopped", "said"),
     [
-        (0, 0.99, True, False, "meets what is required: of all flights at least 99 % keep it, shown with 90 % confidence"),
+        (0, 0.99, True, False, "meets what is required: of all flights at least 99 % meet it, shown with 90 % confidence"),
         (400, 0.99, True, False, "misses what is required: more than"),
         (
             10,
             0.99,
             True,
             False,
-            "leaves what is required open: whether 99 % of all flights keep it (10 of 1000 runs miss it",
+            "leaves what is required open: whether 99 % of all flights meet it (10 of 1000 runs miss it",
         ),
-        (0, 0.99, False, False, "is not judged, for runs by Sobol' points are not independent of each other"),
+        (0, 0.99, False, False, "is not judged, because runs by Sobol' points are not independent"),
         (0, 0.99, True, True, "and it holds whenever the campaign was stopped"),
     ],
 )

@@ -142,7 +142,7 @@ def test_claims_grey_out_and_stay_lit(browser: Browser, page: Path) -> None:
     found = grey()
     assert "Converges" in found["lyapunov"]
     assert found["sliding"] == []
-    assert "k_rate is another" in browser.ask('document.querySelector(".claim.grey .now").textContent')
+    assert "k_rate has changed" in browser.ask('document.querySelector(".claim.grey .now").textContent')
     browser.ask('document.getElementById("dials-reset").click()')
     assert set(map(tuple, grey().values())) == {()}
     # An inertia that the law does not know: the claim that holds for any of them stays lit.

@@ -42,7 +42,7 @@ def test_limits_that_are_not_given_are_null_and_kept() -> None:
     found = flights[0].metrics
     assert (found["rate_limit"], found["acceleration_limit"], found["limits_kept"]) == (None, None, True)
     assert found["transient_time"] is None
-    assert transient_text(flights[0]).startswith("transient comes to no end; peak rate")
+    assert transient_text(flights[0]).startswith("transient does not end; peak rate")
     assert " of " not in transient_text(flights[0])
 
 

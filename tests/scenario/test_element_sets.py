@@ -70,7 +70,7 @@ def written(folder, text, name="own.tle"):
 
 def test_a_flight_begins_where_sgp4_says_and_the_difference_is_said(tmp_path):
     orbit = written(tmp_path, "\n".join(("ISS (ZARYA)", *ISS)))
-    with pytest.warns(UserWarning, match=r"orbit.tle: .* lie 49\.2 km from SGP4's orbit in 5400 s; a part such"):
+    with pytest.warns(UserWarning, match=r"orbit.tle: .* departs by 49\.2 km from SGP4's orbit in 5400 s; a part such"):
         scenario = sh.scenario(TABLES | {"orbit": orbit}, folder=tmp_path)
     table, elements = scenario.table.orbit, ElementSet("own.tle", ISS)
     assert table.start == elements.state(elements.epoch)
@@ -95,7 +95,7 @@ def test_a_command_says_the_distance_once_and_of_the_motion_that_flies(tmp_path)
     done = starhold("run", "own.toml", "--pictures", "page", cwd=tmp_path, code=0)
     (line,) = [line for line in done.stderr.splitlines() if "SGP4" in line]
     assert re.search(
-        r"two-body motion with oblateness from its state comes to lie 0?\.?\d* km from SGP4's orbit in 5400 s$", line
+        r"two-body motion with oblateness from this state departs by 0?\.?\d* km from SGP4's orbit in 5400 s$", line
     )
 
 

@@ -55,7 +55,7 @@ def test_a_spreadsheet_is_read_and_written_without_loss(tmp_path, sheet, mark):
         ("id,method,metric,window\nS-1,flight,effort,1 to 2\n", 'requirement 1.window: found "1 to 2"; allowed: a list'),
         ("id,text\nS-1,prose\n", "requirement[1].method: found nothing"),
         ("id,method\nS-1,inspection\ns-1,inspection\n", "requirement[2].id"),
-        ('id,text\nS-1,"open\n', "no CSV"),
+        ('id,text\nS-1,"open\n', "not CSV"),
     ],
 )
 def test_a_faulty_sheet_is_told_in_a_line(tmp_path, text, line):

@@ -206,7 +206,7 @@ def test_masses_and_speeds_that_no_craft_has_are_refused():
     ):
         craft.with_({"spacecraft.mass": 1.01 * ball})
     wheels = sh.load("wheels-orbital")
-    told = r"wheel 1 turns at 1.91e\+05 rpm with its most momentum, 20 N m s: is another unit meant"
+    told = r"wheel 1 turns at 1.91e\+05 rpm at its largest momentum, 20 N m s: is another unit meant"
     with pytest.raises(sh.InputError, match=told):
         wheels.with_({"wheels.momentum_limit": 20.0})
 

@@ -316,7 +316,7 @@ def test_a_check_that_does_not_end_or_ends_its_process_is_told(tmp_path: Path) -
         assert checker.check(flown.text(), "mine.toml", tmp_path)["name"] == "three-laws"
         checker = Checker(longest=3.0) if checker.close() is None else checker
         said = checker.check(f'{head}[[law]]\nfile = "endless.py"\n', "mine.toml", tmp_path)
-        assert said == {"error": "mine.toml: the check did not end within 3 s; a file that it names may not"}
+        assert said == {"error": "mine.toml: the check did not end within 3 s; a file that the scenario names may hang"}
         checker.close()
         checker = Checker()
         assert (

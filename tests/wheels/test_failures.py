@@ -217,7 +217,7 @@ def test_the_losses_that_a_mode_waits_for_are_no_gain(tmp_path, capsys):
     law += f'[[law.mode]]\nname = "work"\n{gains}[[law.mode]]\nname = "safe"\n{gains}'
     _, said, _ = intact_and_struck(law, tmp_path, capsys)
     assert "wheels_lost" not in said
-    assert ("not settled: at the end of the mission" in said) == ("not settled" in said.replace("not settled:", ""))
+    assert ("not settled: judged at the end of the flight" in said) == ("not settled" in said.replace("not settled:", ""))
     assert "The gains are the same in all of them." in said
 
 

@@ -153,12 +153,12 @@ def test_a_held_torque_shared_out_once_is_that_shared_out_at_every_stage(allocat
 @pytest.mark.parametrize(
     ("parts", "limit", "said"),
     [
-        ((STIFF,), "", "what the wheels surely give about each axis at once, "),
+        ((STIFF,), "", "torque that the wheels always give about all axes at once, "),
         ((STIFF,), "torque_limit = 0.01", "limit of each axis, 0.01 N m"),
         (
             (LOST, GENTLE + 'fault_action = "none"\n'),
             'limit = "norm"',
-            "what the wheels surely give in norm before a fault, ",
+            "torque that the wheels always give in norm before a fault, ",
         ),
     ],
 )

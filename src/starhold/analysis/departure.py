@@ -17,6 +17,7 @@ from starhold.analysis.rigid_body import error_angle
 from starhold.certification.appendages import recorded_states, start_of
 from starhold.certification.assumptions import LINEAR, assumption
 from starhold.certification.certificate import Certificate, Claim
+from starhold.certification.unmodelled import BOUNDED
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
@@ -160,7 +161,7 @@ def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departur
     # V is at most `start` at the start, and at most `level` from then on; None for no bound.
     start = claim.numbers.get("start")
     level = claim.numbers.get("level", start)
-    value = None if start is None or level is None else value_of(programs, span.loop, span.shown)
+    value = None if start is None or level is None else height_of(claim, span.loop, span.shown)
     if value is None:
         return left
     if value[0] > start:
@@ -230,7 +231,7 @@ def covered(
     claim, span = certificate.claim("pointing"), Span(loop, run, first, last)
     if claim is None or claim.outcome != "proved" or not len(span["time"]):
         return None
-    inside = value_of(claim.programs, loop, span.shown) <= claim.numbers["start"]
+    inside = height_of(claim, loop, span.shown) <= claim.numbers["start"]
     wrong = [np.flatnonzero(far) for far in _misreadings(claim, span)]
     settled = max((int(far[-1]) + 1 for far in wrong if len(far)), default=0)
     begins = np.flatnonzero(inside[settled:])
@@ -249,7 +250,7 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     shown = shown_at(loop, loop.start)
     momentum = momentum_of(loop, shown)
     for claim in _left(certificate):
-        value = value_of(claim.programs, loop, shown)
+        value = height_of(claim, loop, shown)
         if value is not None and "start" in claim.numbers:
             level = claim.numbers["start"]
             within = momentum <= claim.numbers.get("momentum", np.inf) and (level is None or value <= level)
@@ -271,6 +272,17 @@ def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
     error = np.array(shown.attitude)
     attitude: Any = tuple(fed_back(loop, np.atleast_2d(error.T)).T.reshape(error.shape))
     return shown._replace(attitude=attitude)
+
+
+def height_of(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
+    """Return V of a claim at measurements as `value_of` does. Where the level holds the other quaternion of the target too,
+    the set of a claim about the loop as it flies is its part with q0 > 0, and V is infinite outside of that, but for a law
+    that is the same at both."""
+    value = value_of(claim.programs, loop, shown)
+    if value is None or claim.kind not in BOUNDED or loop.law.card.quaternion_sign == "even":
+        return value
+    other = value_of(claim.programs, loop, shown._replace(attitude=(-1.0, *ZERO), rate=ZERO))
+    return np.where((np.asarray(shown.attitude[0]) > 0.0) | (other > claim.numbers["start"]), value, np.inf)
 
 
 def value_of(programs: Mapping[str, Any], loop: ClosedLoop, shown: Measurement) -> Any:

@@ -1,5 +1,5 @@
-"""Campaigns: many runs with dispersions, their verdicts and what drives them. Called, this package is `starhold.campaign`, a
-function of the Python interface."""
+"""Campaigns: many runs with dispersions, their verdicts and their drivers. The package is callable: `starhold.campaign(...)`
+is the function of the Python interface."""
 
 import sys
 from importlib import import_module

@@ -18,12 +18,12 @@ from starhold.studies.compare import fly_law
 from starhold.studies.flight import Flight
 
 WORDS = ("name", "description", "type", "campaign")
-"""Keys whose texts never name a file."""
+"""Keys whose values never name a file."""
 
 
 class FlownAgain(NamedTuple):
-    """A run of a campaign, flown again: its scenario, its flight, and the columns whose bits differ from those of the
-    campaign, as they may on another machine."""
+    """A run of a campaign, flown again: its scenario, its flight, and the columns whose values differ in any bit from the
+    stored ones, as may happen on another machine."""
 
     scenario: Scenario
     flight: Flight
@@ -31,7 +31,8 @@ class FlownAgain(NamedTuple):
 
 
 def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
-    """Fly one run of a campaign again from its own scenario, and record it. InputError where there is no such run."""
+    """Fly one run of a campaign again from its own scenario and return it with a recording. InputError if there is no such
+    run, or a file that the scenario reads has changed."""
     store = Store.open(folder)
     manifest = store.manifest
     name = manifest.laws[0] if law is None else law
@@ -54,7 +55,7 @@ def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
 
 @lru_cache(maxsize=1)
 def _job_of(source: Source) -> Job:
-    """The job that flew a campaign, kept so that several of its runs share it."""
+    """Return the job of a campaign, cached so that several of its runs share it."""
     return Job(source, source.read().table.campaign)
 
 
@@ -63,7 +64,7 @@ def _equal(a: Any, b: Any) -> bool:
 
 
 def hashes(text: str, where: str, folder: Path) -> dict[str, str]:
-    """Return SHA-256 of the files that a scenario's text names as modules or as tables of numbers."""
+    """Return the SHA-256, by name, of the files that a scenario's text names, such as modules or tables of numbers."""
     digests: dict[str, str] = {}
 
     def look(value: Any) -> None:

@@ -1,4 +1,4 @@
-"""Flies a campaign into a folder, or resumes one."""
+"""Flies a campaign and stores its results in a folder, or resumes one."""
 
 import hashlib
 import os
@@ -30,33 +30,33 @@ from starhold.scenario.checking import show
 from starhold.scenario.reading import Scenario
 
 CHUNK, SMALL = 16384, 512
-"""The number of runs in a block: where the numbers of many runs are computed at once, and where each run's by themselves."""
+"""The number of runs in a block where the loops of many runs are made at once, and where each run's loop is made alone."""
 LOOK = 1024
 """The numbers of runs at which the interim analyses of a sequential campaign are taken."""
 
-NO_TABLE = "a table with [campaign.over] for what is drawn, or a number of runs that differ in their noise alone"
+NO_TABLE = "a table with [campaign.over] for drawn keys, or a number of runs that differ only in their noise"
 Notice = Callable[..., None]
-"""Called with a law and how many more of its runs were flown; of a search for the worst case also with what is `Sought`."""
+"""Called with a law and the number of further runs flown; during a search for the worst case also with its `Sought`."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a campaign is flown; no option changes results. engine: None for all cores of this process."""
+    """Options for flying a campaign; none changes the results. engine: None for all cores of this process."""
 
     engine: Engine | None = None
     resume: bool = False
     force: bool = False
     until_decided: bool = False
     search: bool = True
-    """Whether the worst cases of required metrics are sought over the box of the dispersions."""
+    """Whether to search for the worst cases of required metrics over the box of the dispersions."""
     proof: bool = False
-    """Whether the flights are compared with what is proved of the loop as it flies, which takes seconds a law."""
+    """Whether the flights are compared with the claim proved about the loop as it flies, which takes seconds per law."""
 
 
 def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """Return the scenario with other entries in its [campaign] table, or with such a table, and with other [[requirement]]
-    tables, whose method is "campaign" by default; None leaves an entry as it is. InputError where there is no such table and
-    the entries lack distributions or the number of runs."""
+    """Return the scenario with other entries in its [campaign] table, which is added if absent, and other [[requirement]]
+    tables, with method "campaign" by default; None leaves an entry unchanged. InputError where the table is absent and the
+    entries give neither distributions nor a number of runs."""
     given = {key: value for key, value in changes.items() if value is not None}
     if scenario.table.campaign is None and not given.keys() & {"runs", "over"}:
         raise InputError(scenario.where, "campaign", "no [campaign] table", NO_TABLE)
@@ -69,7 +69,7 @@ def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
 
 
 def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
-    """Make the job of a campaign. InputError for any mistake in it, before anything is flown."""
+    """Return the job of a campaign. InputError for any mistake in it, before anything is flown."""
     table = scenario.table.campaign
     job = Job(Source.of(scenario), table)
     reached: set[str] = set()
@@ -84,7 +84,7 @@ def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
         if name not in reached:
             flown = f"law {laws[0]}" if len(laws) == 1 else "any law"
             raise InputError(
-                scenario.where, f'campaign.over."{name}"', f"changes nothing of what {flown} flies", "a key that reaches it"
+                scenario.where, f'campaign.over."{name}"', f"no effect on the flights of {flown}", "a key that affects them"
             )
     return job
 
@@ -93,8 +93,8 @@ def fly_campaign(
     scenario: Scenario, folder: Path, law: str | None = None, options: Options = Options(), notice: Notice | None = None
 ) -> CampaignResult:
     """Fly the campaign of a scenario's [campaign] table into a folder, for one law or all, and return its result. InputError
-    for any mistake in it, and where flying fails: what was flown until then is kept, and `resume` continues from there. The
-    results are the same for any engine and any chunk.
+    for any mistake in it, and where flying fails: the runs flown until then are kept, and `resume` continues from there. The
+    results are the same for any engine and any chunk size.
     """
     laws = tuple(entry.name for entry in scenario.laws) if law is None else (scenario.pick(law).name,)
     job = begin(scenario, laws)
@@ -167,8 +167,8 @@ def fly_campaign(
 
 
 def _fly_until_decided(store: Store, job: Job, take: Callable[[Sequence[Block]], None]) -> int:
-    """Fly on until every requirement of every law is decided, and return the number of runs. Interim analyses are taken at
-    numbers of runs fixed beforehand, so that every engine stops at the same one."""
+    """Fly until every requirement of every law is decided, and return the number of runs. Interim analyses take place at
+    numbers of runs fixed beforehand, so every engine stops at the same number."""
     most, flown = job.table.runs, 0
     while flown < most:
         flown = min(most, max(flown + LOOK, -(-flown * 5 // (4 * LOOK)) * LOOK))
@@ -199,7 +199,7 @@ def _blocks(store: Store, notice: Notice | None) -> Iterator[tuple[str, int, int
 
 
 def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
-    """Return the number of runs in a block: each worker gets a few blocks, and each block fits into memory."""
+    """Return the number of runs in a block, such that each worker gets a few blocks and each block fits into memory."""
     most = CHUNK if at_once else SMALL
     if isinstance(engine, Workers):
         most = min(most, -(-runs // (4 * engine.count)))
@@ -207,7 +207,7 @@ def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
 
 
 def in_words(dispersion: Dispersion, table: CampaignTable) -> str:
-    """Write a dispersion as in the file, in one line."""
+    """Return a dispersion as one line of text, with its parameters as in the file."""
     given = table.over[dispersion.places[0].table]
     options = {"judged_apart": "known before flight", "known_to_law": "known to the law"}
     numbers = given.model_dump(exclude_defaults=True, exclude={"distribution", *options})
@@ -221,9 +221,9 @@ def in_words(dispersion: Dispersion, table: CampaignTable) -> str:
 
 
 def digest(store: Store, runs: int | None = None) -> str:
-    """Return SHA-256, in hexadecimal, of the results: law by law in the manifest's order, column by column in the order of
-    names, run by run; numbers as little-endian bytes, text as lengths and UTF-8; then counts and extremes. runs: the number
-    of runs of each law, where fewer than planned are flown. InputError where a chunk is missing or superfluous."""
+    """Return the SHA-256, in hexadecimal, of the results: law by law in the manifest's order, column by column in the order
+    of names, run by run; numbers as little-endian bytes, text as lengths and UTF-8; then counts and extremes. runs: the
+    number of runs of each law, if fewer than planned. InputError where a chunk is missing or superfluous."""
     wanted = store.manifest.runs if runs is None else runs
     whole = hashlib.sha256(b"starhold campaign 1\n")
     for law in store.manifest.laws:
@@ -250,7 +250,7 @@ def _envelopes(store: Store, law: str) -> Iterator[bytes]:
 
 
 def _named(name: str, values: NDArray[Any]) -> bytes:
-    """Encode an array with its name, type and shape, so that different results never give the same bytes."""
+    """Return an array's bytes with its name, type and shape, so that different results never have the same encoding."""
     kind = values.dtype.kind
     if kind in "OU":
         kind = "text"

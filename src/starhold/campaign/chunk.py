@@ -1,4 +1,4 @@
-"""A chunk is a block of consecutive runs of one law: a row of numbers for each run, and totals over the runs."""
+"""Chunks: the results of a block of consecutive runs of one law, with a row of numbers per run and totals over the runs."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 Counts: TypeAlias = dict[str, NDArray[np.int64]]
 Extremes: TypeAlias = dict[str, NDArray[np.float64]]
 LEAST, MOST = ".least", ".most"
-"""The suffixes of the names of extremes merged by the minimum, and of those merged by the maximum."""
+"""Suffixes of the names of extremes that are merged by taking the minimum and the maximum."""
 
 
 @dataclass(frozen=True)
 class Chunk:
     """The results of one law's runs `first` to `first + count - 1`.
 
-    rows: columns by name, each an array of one element a run: float64 (NaN: the run has no such value), int64, bool or
-        text. The column `run` holds the runs' numbers in order.
-    counts: histograms of any shapes by name; those of several chunks add up.
-    extremes: arrays of any shapes in any unit by name, which ends in `.least` or `.most`; NaN where nothing was measured."""
+    rows: columns by name, each an array (count,) of float64 (NaN: the run has no such value), int64, bool or text. The
+        column `run` holds the runs' numbers in order.
+    counts: histograms of any shape by name; those of several chunks are added.
+    extremes: arrays of any shape and unit by name, which ends in `.least` or `.most`; NaN where nothing was measured."""
 
     law: str
     first: int
@@ -65,8 +65,8 @@ def merge(parts: Iterable[tuple[Counts, Extremes]]) -> tuple[Counts, Extremes]:
 
 
 def _plain(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return values with one kind of NaN and of zero: which of several NaNs, or of 0 and -0, a minimum returns depends on
-    the order."""
+    """Return values with only one kind of NaN and of zero, because it depends on the order which of several NaNs, or of 0
+    and -0, a minimum returns."""
     return np.where(np.isnan(values), np.nan, values + 0.0)
 
 

@@ -22,18 +22,18 @@ class Dispersion:
 
     keys: tuple[str, ...]
     columns: tuple[str, ...]
-    """The names of the drawn numbers: a key, with its component from 1, "initial.rate[2]", or its row and column; for a
-    symmetric matrix those on and above the diagonal."""
+    """The names of the drawn numbers: a key, with its component from 1 as in "initial.rate[2]", or row and column; of a
+    symmetric matrix the entries on and above the diagonal."""
     shape: tuple[int, ...]
-    """The key has this shape: () a number or a word, (n,) a vector or a diagonal, (n, n) a matrix. Several keys hold a
-    number each."""
+    """The shape of the key: () for a number or a word, (n,) for a vector or a diagonal, (n, n) for a matrix. Several keys
+    are each a number."""
     distribution: Distribution
     places: tuple[Place, ...]
     """The place of each key, with its bounds."""
     scale: Numbers | None = None
-    """Numbers drawn as shares are shares of these, one for each column; None for absolute numbers."""
+    """The numbers, one per column, by which drawn shares are multiplied; None for absolute numbers."""
     nominal_tables: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    """The tables that go into [nominal], because laws assume the values of the file."""
+    """The tables to add to [nominal], so that laws assume the file's values instead of the drawn ones."""
 
     @property
     def dims(self) -> int:
@@ -42,7 +42,7 @@ class Dispersion:
 
     @property
     def called(self) -> str:
-        """The key, or the several keys."""
+        """The key, or several keys separated by commas."""
         return ", ".join(self.keys)
 
     @property
@@ -52,12 +52,12 @@ class Dispersion:
 
     @property
     def wordy(self) -> bool:
-        """Whether a text is drawn, or a boolean by its name."""
+        """Whether the drawn values are words, or booleans by their names."""
         return self.places[0].wordy
 
     def draw(self, u: Array) -> NDArray[Any]:
-        """Values (columns, n), numbers or words, for uniforms u (dims, n) strictly between 0 and 1. InputError where a
-        number is outside a key's bounds."""
+        """Return values (columns, n), numbers or words, for uniforms u (dims, n) strictly between 0 and 1. InputError where
+        a number is outside a key's bounds."""
         drawn = self._drawn(u)
         if self.wordy or not drawn.size:
             return drawn
@@ -72,12 +72,12 @@ class Dispersion:
         return drawn
 
     def _drawn(self, u: Array) -> NDArray[Any]:
-        # Contiguous, so that the same machine code computes any slice of the same numbers.
+        # Contiguous, so that the same machine code computes every slice of the numbers.
         values = self.distribution.draw(np.ascontiguousarray(u, dtype=np.float64))
         return values if self.scale is None else np.array(self.scale)[:, None] * values
 
     def possible(self, u: Array) -> NDArray[np.bool_]:
-        """Return which of the draws (n,) for uniforms u (dims, n) lie within the bounds of their keys, number by number."""
+        """Return a mask (n,) of the draws for uniforms u (dims, n) whose numbers are all within the bounds of their keys."""
         kept = np.ones(u.shape[1], dtype=bool)
         if self.wordy:
             return kept
@@ -103,7 +103,7 @@ class Dispersion:
         return len(self.columns) < math.prod(self.shape)
 
     def change(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the changes for `Scenario.with_` that give the keys the values of one run, by column."""
+        """Return the argument of `Scenario.with_` that sets the keys to the values of one run, given by column."""
         arrays = self.arrays({name: np.asarray([values[name]]) for name in self.columns})
         changes: dict[str, Any] = {}
         for place in self.places:
@@ -113,14 +113,14 @@ class Dispersion:
 
 
 def _plain(place: Place, value: Any) -> Any:
-    """Return a drawn value as a file would hold it."""
+    """Return a drawn value in the form that a file has."""
     if place.gain is None and isinstance(place.value, bool):
         return value == "true"
     return int(value) if place.whole else value
 
 
 def read_dispersions(scenario: Scenario, over: Mapping[str, Distribution]) -> tuple[Dispersion, ...]:
-    """Make the dispersions of a scenario's keys from the tables of [campaign.over]. InputError for a bad table."""
+    """Return the dispersions of a scenario's keys for the tables of [campaign.over]. InputError for an invalid table."""
     dispersions: list[Dispersion] = []
     taken: list[Place] = []
     for keys, table in over.items():
@@ -135,7 +135,7 @@ def read_dispersions(scenario: Scenario, over: Mapping[str, Distribution]) -> tu
 
 
 def _overlap(one: Place, other: Place) -> bool:
-    """Return whether two keys are the same, or one is a component of the other or removes it."""
+    """Return whether two keys are the same, one is a component of the other, or setting one removes the other."""
     size = min(len(one.path), len(other.path))
     return one.path[:size] == other.path[:size] or one.displaced == other.key or other.displaced == one.key
 
@@ -158,8 +158,8 @@ def _read(scenario: Scenario, places: list[Place], table: Any) -> Dispersion:
 
 
 def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
-    """Return the raw tables for [nominal]: those that laws read or are designed with, whose drawn values laws do not know.
-    InputError where `known_to_law` claims what laws cannot know, or denies what they always know."""
+    """Return the raw tables for [nominal]: tables that laws read or are designed with, but whose drawn values they do not
+    know. InputError where `known_to_law` is true of values that laws cannot know, or false of values they always know."""
     scenario, table = readings[0].scenario, readings[0].table
     tables, body = read_toml(scenario.text, scenario.where), scenario.hooks
     nominal: dict[str, Any] = {}
@@ -173,7 +173,7 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
             raise reading.place.refuse("known_to_law", "false", "true, because laws compute their commands with this number")
         if name == "fault" and table.known_to_law:
             raise reading.place.refuse(
-                "known_to_law", "true", "false, because the action on a fault says what laws learn about it"
+                "known_to_law", "true", "false, because the action on a fault determines what laws learn about it"
             )
         if name == body.marker and not modelled and not table.known_to_law:
             raise reading.place.refuse(
@@ -188,7 +188,7 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
 
 
 def _is_known(scenario: Scenario, tables: Any, place: int, key: str) -> bool:
-    """Return whether laws, or an estimator, compute with a number of a part."""
+    """Return whether a law or an estimator uses the parameter `key` of a part."""
     return scenario.parts[place].part.is_known(key) or is_assumed(scenario.parts, tables, place, key)
 
 

@@ -1,22 +1,22 @@
-"""Finds which inputs, alone or in pairs, make runs fail and drive their metrics; lost runs count too.
+"""Identifies the inputs that, alone or in pairs, make runs fail or drive their metrics; lost runs count as failed.
 
-Every test uses only ranks or counts, so nothing is assumed about distributions, and a run without a metric is simply left
-out for that metric:
+Every test uses only ranks or counts, so nothing is assumed about distributions, and a run without a metric is left out of
+the tests of that metric:
 
 * an input and a metric: Spearman's rank correlation; of a choice between words the correlation ratio of the ranks
   (Kruskal and Wallis, 1952), which for two words is the same up to its sign;
-* an input and failure: the difference of failed and passed runs in it, by Kolmogorov and Smirnov's distance and by Mann and
-  Whitney's statistic as the probability that a failed run has the greater value (the area under the ROC curve); of a choice
-  between words the total variation distance, with the likelihood ratio (G) test;
-* two inputs and failure: whether they fail a run *together*, beyond what each does by itself. Runs survive two independent
+* an input and failure: the difference between failed and passed runs in this input, by the Kolmogorov-Smirnov distance and
+  by the Mann-Whitney statistic as the probability that a failed run has the greater value (the area under the ROC curve);
+  for a choice between words the total variation distance, with the likelihood ratio (G) test;
+* two inputs and failure: whether they fail a run *together*, beyond the effect of each alone. Runs survive two independent
   causes independently, so the probability of passing is a product, 1 - p(x, y) = A(x) B(y) (the noisy-or of J. Pearl,
   "Probabilistic reasoning in intelligent systems", 1988; for rare failures the additive risks of K. J. Rothman, Am. J.
   Epidemiol. 99, 1974). The product is fitted to the failures on a grid of quantile bins by maximum likelihood, and the
   likelihood ratio against a probability for each cell measures the misfit. A single cause, or two independent ones, fit
   exactly, whatever their shape; failure only where both are high, or only where just one is, does not.
 
-All p-values are corrected together (S. Holm, Scand. J. Statist. 6, 1979): among all that was tested, anything is wrongly
-called significant with probability `RISK` at most, for inputs that are drawn independently. Where two inputs were drawn
+All p-values are corrected together (S. Holm, Scand. J. Statist. 6, 1979): for inputs that are drawn independently, the
+probability that any of the tests wrongly finds a significant dependence is at most `RISK`. Where two inputs are drawn
 together, each shows the effects of the other; such pairs are marked.
 """
 
@@ -31,11 +31,11 @@ from numpy.typing import NDArray
 from scipy import special
 
 ALMOST = 0.9
-"""A bin has at least this part of the requested share, because runs do not divide evenly."""
+"""The least content of a bin as a part of the requested share, because runs do not divide evenly."""
 
 
 class Column:
-    """An input: the order of its values, and for each value the index of its group of equal values."""
+    """An input: the order of its values, and for each value the index of its group of ties."""
 
     def __init__(self, name: str, values: NDArray) -> None:
         self.name, self.words = name, values.dtype.kind not in "fiub"
@@ -51,10 +51,10 @@ class Column:
         self.order = np.argsort(self.values).astype(np.int32)
         rising = self.values[self.order]
         self.steps = np.concatenate([[False], rising[1:] != rising[:-1]]).cumsum(dtype=np.int32)
-        """Group of each value, in rising order."""
+        """The group of ties of each value, in increasing order of values."""
 
     def ranks(self, there: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Return the ranks of the runs that are `there`, less their mean; equal values share theirs."""
+        """Return the ranks of the runs in the mask `there`, minus their mean; tied values share a rank."""
         rows = self.order[there[self.order]]
         groups = self.steps[there[self.order]]
         sizes = np.bincount(groups)
@@ -63,10 +63,10 @@ class Column:
         return ranks[there] - 0.5 * len(rows)
 
     def grid(self, bins: int, least: float) -> tuple[NDArray[np.int32], list[str]]:
-        """Put each run into a bin with at least about the share `least` of all; return indices and ranges of bins."""
+        """Return the index of each run's bin, and descriptions of the bins; each holds about the share `least` or more."""
         ranks = self.ranks(np.ones(len(self.values), bool))
         codes = np.minimum((ranks / len(ranks) + 0.5) * bins, bins - 1).astype(np.int32)
-        # Many equal values leave bins uneven: neighbours are joined until each has its share.
+        # Ties leave bins uneven: neighbouring bins are joined until each has its share.
         joined, filled, shares = [], 0.0, np.bincount(codes, minlength=bins) / len(codes)
         for share in shares:
             joined.append(joined[-1] + (filled >= ALMOST * least) if joined else 0)
@@ -81,7 +81,7 @@ class Column:
         return codes, labels
 
     def words_grid(self, least: float) -> tuple[NDArray[np.int32], list[str]]:
-        """Number the words, those rarer than `least` together as one."""
+        """Return the index of each run's word, and the words; those rarer than `least` are counted as one."""
         shares = np.bincount(self.group) / len(self.group)
         common = np.flatnonzero(shares >= ALMOST * least)
         if len(common) < len(shares) and 1.0 - shares[common].sum() < ALMOST * least:
@@ -95,10 +95,10 @@ class Column:
 Array: TypeAlias = NDArray[np.float64]
 RISK = 0.05
 LEAST = 5
-"""The least number of failed runs, and of passed runs, for a statement about failure; and the least expected failures in a
-cell of a pair's grid."""
+"""The least number of failed and of passed runs for a statement about failure; also the least expected number of failures
+in a cell of a pair's grid."""
 BINS = 4
-"""The most bins of a number in a pair's grid."""
+"""The most bins of a numerical input in a pair's grid."""
 RAREST = 0.05
 """Values of a choice rarer than this share are counted together in a pair's grid."""
 TOGETHER = 1e-3
@@ -106,13 +106,13 @@ TOGETHER = 1e-3
 FEWEST_RUNS = 10
 """The least number of runs with a metric for a statement about it."""
 ROUNDS = 300
-"""The rounds of the fit of independent causes; the likelihood grows in each, and stopping early overstates a pair only a
-little."""
+"""The number of iterations of the fit of independent causes; each increases the likelihood, and stopping early overstates a
+pair only slightly."""
 
 
 @dataclass(frozen=True)
 class _Driver:
-    """A dependence that was tested: `p` is its p-value by itself, `corrected` that among all tests."""
+    """A tested dependence: `p` is its p-value alone, `corrected` its p-value among all tests."""
 
     p: float
     corrected: float
@@ -125,8 +125,8 @@ class _Driver:
 
 @dataclass(frozen=True)
 class MetricDriver(_Driver):
-    """How strongly an input drives a metric over the `runs` that have it: rank correlation, or correlation ratio for a
-    choice of words."""
+    """The strength with which an input drives a metric over the `runs` that have it: rank correlation, or for a choice of
+    words the correlation ratio."""
 
     input: str
     metric: str
@@ -137,10 +137,10 @@ class MetricDriver(_Driver):
 
 @dataclass(frozen=True)
 class FailureDriver(_Driver):
-    """How failed runs differ from passed ones in an input: `distance` between the distributions, from 0 to 1, and `above`,
-    the probability that a failed run has the greater value, ties split evenly (None for words). `range` (low, high) has
-    nine in ten failed runs; for words it says with which of them runs fail most often. `p`: of a number, which is tested
-    twice, twice the lesser of the two p-values (Bonferroni)."""
+    """The difference between failed and passed runs in an input: `distance` between the distributions, from 0 to 1, and
+    `above`, the probability that a failed run has the greater value, ties split evenly (None for words). `range` (low, high)
+    contains nine in ten failed runs; for words it names those with which runs fail most often. `p`: numbers are tested
+    twice, so it is twice the smaller of the two p-values (Bonferroni)."""
 
     input: str
     distance: float
@@ -150,9 +150,9 @@ class FailureDriver(_Driver):
 
 @dataclass(frozen=True)
 class PairDriver(_Driver):
-    """How two inputs make runs fail together: twice the logarithm of the likelihood ratio against independent causes, which
-    by chance is chi-square with `degrees` of freedom; in the cell `where` of their grid the share `failed` of the runs
-    fails. `drawn_together`: the draws of the two depend on each other, so that one may stand for the other."""
+    """The joint effect of two inputs on failure: twice the logarithm of the likelihood ratio against independent causes,
+    which by chance is chi-square with `degrees` of freedom; in the cell `where` of their grid the share `failed` of the runs
+    fails. `drawn_together`: whether the draws of the two are dependent, so that one may stand for the other."""
 
     inputs: tuple[str, str]
     statistic: float
@@ -164,8 +164,8 @@ class PairDriver(_Driver):
 
 @dataclass(frozen=True)
 class Drivers:
-    """Drivers of failures and metrics, the strongest first in each list, including everything that was tested. `skipped`
-    names inputs that are constant or lack values, `remark` says what was left out because of too few runs.
+    """Drivers of failures and metrics, strongest first in each list, including all that were tested. `skipped` names inputs
+    that are constant or lack values, `remark` the tests left out because of too few runs.
     """
 
     runs: int
@@ -178,8 +178,8 @@ class Drivers:
 
 
 def find_drivers(inputs: Mapping[str, NDArray], failed: NDArray[np.bool_], metrics: Mapping[str, NDArray]) -> Drivers:
-    """Find what drives failures and metrics in columns (n,) with a number, or a word, for each run, one column for each
-    component of a vector; `failed` (n,) says which runs failed. NaN in a metric: the run does not have it.
+    """Return the drivers of failures and metrics. inputs: columns (n,) with a number or a word per run, one column for each
+    component of a vector; failed: a mask (n,); metrics: columns (n,), NaN where a run does not have the metric.
     """
     failed = np.asarray(failed, dtype=bool)
     failures, passed = int(failed.sum()), int((~failed).sum())
@@ -233,7 +233,7 @@ def _between(column: Column, failed: NDArray[np.bool_]) -> FailureDriver:
 
 
 def _pairs(used: list[Column], failed: NDArray[np.bool_], bins: int) -> list[PairDriver]:
-    """Test each pair of inputs for joint failures; p-values are not yet corrected."""
+    """Return each pair of inputs tested for joint failures; p-values are not yet corrected."""
     least = max(RAREST, LEAST / min(failed.sum(), (~failed).sum()))
     grids = [(column.name, *(column.words_grid(least) if column.words else column.grid(bins, least))) for column in used]
     grids = [grid for grid in grids if len(grid[2]) > 1]
@@ -272,8 +272,8 @@ def _pairs(used: list[Column], failed: NDArray[np.bool_], bins: int) -> list[Pai
 
 
 def _misfit(counts: NDArray, expected: Array, axes: tuple[int, ...]) -> Array:
-    """Return the deviation of counts from those expected, chi-square distributed by chance: the lesser of the likelihood
-    ratio and Pearson's statistic. They agree for many runs; for few, one or the other exaggerates."""
+    """Return the deviation of counts from the expected ones, chi-square distributed by chance: the smaller of the likelihood
+    ratio and Pearson's statistic. They agree for many runs; for few, either may exaggerate."""
     ratio = 2.0 * special.rel_entr(counts, expected).sum(axes)
     deviation = np.divide((counts - expected) ** 2, expected, out=np.zeros_like(expected), where=expected > 0.0)
     return np.minimum(ratio, deviation.sum(axes))
@@ -282,7 +282,8 @@ def _misfit(counts: NDArray, expected: Array, axes: tuple[int, ...]) -> Array:
 def _tables(
     grids: list[tuple[NDArray[np.int32], int]], failed: NDArray[np.bool_], pairs: list[tuple[int, int]]
 ) -> tuple[Array, Array]:
-    """Count runs, and failed runs, in the cells of each pair's grid (pairs, bins, bins), with zeros beyond its own bins."""
+    """Return the counts of runs and of failed runs in the cells of each pair's grid, both (pairs, bins, bins), padded with
+    zeros."""
     widest = max(size for _, size in grids)
     rows = [codes * np.int32(2 * widest) for codes, _ in grids]
     columns = [codes * np.int32(2) + failed for codes, _ in grids]
@@ -292,10 +293,11 @@ def _tables(
 
 
 def independent_causes(failures: Array, runs: Array) -> Array:
-    """Fit the probability to fail 1 - (1 - a_i)(1 - b_j), by maximum likelihood, to counts on grids (grids, rows, columns).
+    """Fit the failure probability 1 - (1 - a_i)(1 - b_j), by maximum likelihood, to counts on grids (grids, rows, columns).
 
-    Returns the probabilities in the same form. By expectation-maximization: a failure is attributed to each cause as its
-    probability has it, and each probability becomes the share of runs so attributed. The likelihood grows in each round."""
+    Returns the probabilities in the same shape. The method is expectation-maximization: each failure is attributed to the
+    causes in proportion to their probabilities, and each probability becomes the share of runs attributed to it. Every
+    iteration increases the likelihood."""
     rows, columns = (runs.sum(axis, keepdims=True).clip(1.0) for axis in (2, 1))
     a = 0.5 * failures.sum(2, keepdims=True) / rows
     b = 0.5 * failures.sum(1, keepdims=True) / columns
@@ -308,7 +310,7 @@ def independent_causes(failures: Array, runs: Array) -> Array:
 
 
 def _moved(used: list[Column], metrics: Mapping[str, NDArray]) -> list[MetricDriver]:
-    """Correlate each input with each metric; p-values are not yet corrected."""
+    """Return the correlation of each input with each metric; p-values are not yet corrected."""
     groups: dict[bytes, list[tuple[str, Array]]] = {}
     for name, values in metrics.items():
         values = np.asarray(values, dtype=np.float64)
@@ -331,11 +333,11 @@ def _moved(used: list[Column], metrics: Mapping[str, NDArray]) -> list[MetricDri
 
 
 Correlate: TypeAlias = Callable[[Array], tuple[float, float]]
-"""Computes from a metric's ranks (n,), less their mean, the strength of a dependence and its p-value."""
+"""Returns the strength of a dependence and its p-value for the ranks (n,) of a metric, minus their mean."""
 
 
 def _rank_correlation(values: Array) -> Correlate | None:
-    """Return Spearman's correlation with an input's ranks (n,); None where they are all equal."""
+    """Return the function for Spearman's correlation with an input's ranks (n,); None where these are all equal."""
     n, norm = len(values), _product(values, values)
 
     def correlate(ranks: Array) -> tuple[float, float]:
@@ -346,7 +348,7 @@ def _rank_correlation(values: Array) -> Correlate | None:
 
 
 def _word_correlation(group: NDArray[np.intp]) -> Correlate | None:
-    """Return the correlation ratio with an input's words (n,), numbered; None where they are all the same."""
+    """Return the function for the correlation ratio with an input's words, given by index (n,); None for a single word."""
     n, sizes = len(group), np.bincount(group)
     kinds = int((sizes > 0).sum())
 
@@ -358,12 +360,13 @@ def _word_correlation(group: NDArray[np.intp]) -> Correlate | None:
 
 
 def _product(one: Array, other: Array) -> float:
-    """Return the inner product; BLAS would start threads, and its order of summation depends on their number."""
+    """Return the inner product, without BLAS, which would start threads and sum in an order that depends on their number."""
     return float(np.einsum("i,i", one, other))
 
 
 def _holm(chances: Array) -> Array:
-    """Correct p-values for their number: each is at most the risk that one as small comes up somewhere by chance."""
+    """Return p-values corrected for their number, so that each bounds the risk that any test gives one as small by
+    chance."""
     order = np.argsort(chances, kind="stable")
     corrected = np.empty(len(chances))
     corrected[order] = np.maximum.accumulate(np.minimum(1.0, chances[order] * np.arange(len(chances), 0, -1)))
@@ -371,7 +374,7 @@ def _holm(chances: Array) -> Array:
 
 
 def _remark(failures: int, passed: int, bins: int) -> str:
-    """Name the tests that are left out because of too few runs."""
+    """Return a sentence about the tests left out because of too few runs, or ""."""
     if failures < LEAST:
         return f"too few failures to find their drivers: {failures}; at least {LEAST} are needed"
     if passed < LEAST:

@@ -1,6 +1,6 @@
-"""Engines fly the blocks of a campaign in this process, in processes of this machine, on its GPU, or on a Dask cluster. One
-task is one block of runs, never a single run. Results return to this process, which alone writes them; a few blocks for each
-worker are in flight at once, so that memory stays bounded for any number of runs.
+"""Engines fly the blocks of a campaign in this process, in processes on this machine, on its GPU, or on a Dask cluster. One
+task is one block of runs, never a single run. Results return to this process, which alone writes them; only a few blocks per
+worker are in flight at once, so memory stays bounded for any number of runs.
 """
 
 from __future__ import annotations
@@ -36,41 +36,40 @@ from starhold.version import __version__
 Block: TypeAlias = tuple[str, int, int]
 """A law, the number of the first run, and the number of runs."""
 _AHEAD = 2
-"""The number of blocks in flight in this process, or for each thread of a worker: one being flown, and one ready to follow.
-"""
+"""The number of blocks in flight in this process, or per thread of a worker: one being flown, and one waiting."""
 _LOOK = 1.0
-"""Seconds between two checks whether a cluster that returns nothing is still alive."""
+"""Seconds between checks whether a silent cluster is still alive."""
 _CHECKED = 0.1
-"""The share of the time that may be spent on checking runs of workers, beyond one run of each."""
-_KEPT = "what was flown is kept, --resume continues from there"
+"""The share of the time that may be spent on checking workers' results, beyond one run of each worker."""
+_KEPT = "the runs flown are kept, --resume continues from there"
 
 
 class Job(Protocol):
-    """Begins to fly a block, and returns a function that waits for its results; pickled for other processes, which keep it
-    between blocks."""
+    """A job begins to fly a block and returns a function that waits for its results. It is pickled for other processes,
+    which keep it between blocks."""
 
     def __call__(self, law: str, first: int, count: int, pool: Pool, /) -> Callable[[], Chunk]: ...
 
 
 @dataclass(frozen=True)
 class Threads:
-    """Flies blocks one after the other in this process, each by `count` threads; meanwhile this thread prepares the next
-    block and stores the previous one."""
+    """Flies blocks one after the other in this process, each on `count` threads, while this thread prepares the next block
+    and stores the previous one."""
 
     count: int
 
 
 @dataclass(frozen=True)
 class Workers:
-    """`count` processes of this machine with one thread each, which only this process can reach."""
+    """`count` processes on this machine with one thread each, which communicate only with this process."""
 
     count: int
 
 
 @dataclass(frozen=True)
 class Scheduler:
-    """An existing Dask cluster, by its scheduler's address such as `tcp://host:8786`. patience: seconds to wait for a worker
-    at the start and after all were lost.
+    """An existing Dask cluster, given by its scheduler's address such as `tcp://host:8786`. patience: seconds to wait for a
+    worker at the start and after all were lost.
     """
 
     address: str
@@ -79,22 +78,22 @@ class Scheduler:
 
 @dataclass(frozen=True)
 class Gpu:
-    """Flies blocks one after the other on the first NVIDIA GPU of this machine, each run in a thread of its own."""
+    """Flies blocks one after the other on the first NVIDIA GPU of this machine, with one GPU thread per run."""
 
 
 Engine: TypeAlias = Threads | Workers | Scheduler | Gpu
 
 
 Fly: TypeAlias = Callable[[list[Block]], Iterator[Chunk]]
-"""Flies blocks, in any order."""
+"""Flies blocks and yields their results in any order."""
 
 
 @contextmanager
 def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
     """Yield the function that flies blocks of a job, at most `most` at a time, once workers are started or reached.
-    InputError where a job raises one or fails; where workers cannot be started or reached, have other versions of the
-    packages, or compute other bits; and where all of them, or the scheduler, are lost: results returned by then are
-    complete, as they are after KeyboardInterrupt.
+    InputError where the job raises one or fails; where workers cannot be started or reached, have other versions of the
+    packages, or compute different bits; and where all workers, or the scheduler, are lost. Results returned before an error
+    or a KeyboardInterrupt are complete.
     """
     if isinstance(engine, Threads):
         with ThreadPool(engine.count) as pool:
@@ -115,12 +114,12 @@ def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
 
 
 def _fly_there(job: Job, blocks: list[Block], device: Device) -> Iterator[tuple[Block, _Told]]:
-    """Yield blocks with the results of a GPU. InputError where its driver fails."""
+    """Yield blocks with their results from a GPU. InputError where its driver fails."""
     try:
         for block, chunk in zip(blocks, _fly_here(job, blocks, device), strict=True):
             yield block, (device.processor, chunk)
     except DeviceError as error:
-        raise InputError("campaign", "gpu", str(error), f"a GPU that works; {_KEPT}") from None
+        raise InputError("campaign", "gpu", str(error), f"a working GPU; {_KEPT}") from None
 
 
 def _fly_here(job: Job, blocks: list[Block], pool: Pool) -> Iterator[Chunk]:
@@ -136,8 +135,8 @@ def _fly_here(job: Job, blocks: list[Block], pool: Pool) -> Iterator[Chunk]:
 def _believed(
     job: Job, results: Iterator[tuple[Block, _Told]], name: str, checked: tuple[int, ...] = (0,)
 ) -> Iterator[Chunk]:
-    """Yield blocks whose results are checked. Some runs (`checked`, by default the first) of each worker's first block, and
-    of further blocks while that takes little time, are flown here again and must give the same bits; else InputError."""
+    """Yield the checked results of blocks. Some runs (`checked`, by default the first) of each worker's first block, and of
+    further blocks while this takes little time, are flown again here. InputError unless they give the same bits."""
     begun, spent, seen = time.monotonic(), 0.0, set[str]()
     columns: dict[str, dict[str, str]] = {}
     with ThreadPool(1) as pool:
@@ -146,7 +145,7 @@ def _believed(
             if isinstance(result, InputError):
                 raise result
             if not _is_chunk(result, law, first, count) or columns.setdefault(law, _kinds(result)) != _kinds(result):
-                raise InputError(name, who, f"something else than {runs}", _KEPT)
+                raise InputError(name, who, f"a result that is not of {runs}", _KEPT)
             if who not in seen or spent < _CHECKED * (time.monotonic() - begun):
                 seen.add(who)
                 started = time.monotonic()
@@ -179,7 +178,7 @@ def _kinds(chunk: Chunk) -> dict[str, str]:
 
 
 def _differing(chunk: Chunk, again: Chunk, place: int) -> str:
-    """List the columns whose value at a place differs from that of the same run flown here."""
+    """Return the names of the columns whose value at a place differs from that of the same run flown here."""
     if _kinds(chunk) != _kinds(again):
         return "which has other columns"
     pairs = {name: (chunk.rows[name][place : place + 1], values[:1]) for name, values in again.rows.items()}
@@ -188,7 +187,7 @@ def _differing(chunk: Chunk, again: Chunk, place: int) -> str:
 
 
 def _bits(values: NDArray[Any]) -> Any:
-    """Return the bytes that must be equal; NaN counts as one value, because machines may differ in its bits."""
+    """Return the bytes to compare; all NaNs count as equal, because machines may differ in their bits."""
     if values.dtype.kind == "f":
         values = np.where(np.isnan(values), np.nan, values)
     return values.tolist() if values.dtype.kind in "OU" else values.tobytes()
@@ -196,7 +195,7 @@ def _bits(values: NDArray[Any]) -> Any:
 
 @lru_cache(maxsize=1)
 def _unpacked(packed: bytes) -> Job:
-    """Return the job, kept between blocks together with its compiled kernels."""
+    """Return the unpickled job, cached between blocks together with its compiled kernels."""
     return extra("cloudpickle").loads(packed)
 
 
@@ -205,14 +204,14 @@ _Told: TypeAlias = tuple[str, Chunk | InputError]
 
 
 def _fly(packed: bytes, version: str, law: str, first: int, count: int) -> _Told:
-    """Fly a block in a worker. version: of starhold in the process that asks."""
+    """Fly a block in a worker and return its result. version: that of starhold in the process that sent the block."""
     who = f"process {os.getpid()} on {platform.node()}"
     if version != __version__:
         return who, InputError("a worker", "", f"starhold {__version__}", f"{version}, as here")
     try:
         job = _unpacked(packed)
     except ImportError as error:
-        message = f"cannot read the campaign: {error}; it needs the packages that are here"
+        message = f"cannot read the campaign: {error}; it needs the packages installed here"
         return who, InputError("a worker", "", "", message)
     try:
         with ThreadPool(1) as pool:
@@ -231,7 +230,7 @@ def _in_a_line(error: BaseException) -> str:
 
 @dataclass(frozen=True)
 class _Cluster:
-    """A client of a cluster, and the cluster's name in errors."""
+    """A client of a Dask cluster, with the cluster's name in errors."""
 
     client: Any
     name: str
@@ -260,7 +259,7 @@ class _Cluster:
                 future.release()
 
     def _threads(self) -> int:
-        """Return how many blocks the cluster flies at once at this moment."""
+        """Return the number of blocks that the cluster can fly at once at this moment."""
         if self.client.status != "running":
             raise self._lost("the scheduler does not answer")
         try:
@@ -269,7 +268,7 @@ class _Cluster:
             raise self._lost("the scheduler does not answer") from None
 
     def _next(self, done: SimpleQueue[Any]) -> Any:
-        """Return a task that has ended; InputError once no worker is left."""
+        """Return a task that has ended. InputError once there has been no worker for too long."""
         alone = 0.0
         while True:
             try:
@@ -278,7 +277,7 @@ class _Cluster:
                 alone = self._still_alone(alone)
 
     def _still_alone(self, alone: float) -> float:
-        """Return the seconds without any worker after one more check; InputError once they exceed the patience."""
+        """Return the seconds without any worker, after one more check. InputError once they exceed the patience."""
         alone = alone + _LOOK if self._threads() == 0 else 0.0
         if alone >= self.patience:
             raise self._lost(f"no worker for {self.patience:g} s")
@@ -350,7 +349,7 @@ def _check_versions(cluster: _Cluster) -> None:
 
 
 def _compared(versions: Any) -> dict[str, str]:
-    """Return the versions that must agree for pickles; for Python the two numbers on which pickled code depends."""
+    """Return the versions that must agree for pickling; of Python only the two numbers on which pickled code depends."""
     packages = versions["packages"]
     python = ".".join(str(packages["python"]).split(".")[:2])
     return {"python": python, "dask": packages["dask"], "distributed": packages["distributed"]}
@@ -358,7 +357,7 @@ def _compared(versions: Any) -> dict[str, str]:
 
 @contextmanager
 def _quiet() -> Generator[None]:
-    """Silence Dask's log and warnings; errors of one line replace those that matter."""
+    """Silence Dask's log and warnings; those that matter are reported as one-line errors."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in ("distributed", "tornado")]
     handlers = {handler for name in ("distributed", *names) for handler in logging.getLogger(name).handlers}
     levels = [(handler, handler.level) for handler in handlers]
@@ -374,7 +373,7 @@ def _quiet() -> Generator[None]:
 
 
 def engine_of(threads: int | None, workers: int | None, scheduler: str | None, gpu: bool = False) -> Engine | None:
-    """Return the requested engine, or None. InputError for more than one, and for less than one thread or process."""
+    """Return the requested engine, or None. InputError for more than one, and for fewer than one thread or process."""
     options = {"threads": threads, "workers": workers, "scheduler": scheduler, "gpu": gpu or None}
     given = [name for name, value in options.items() if value is not None]
     if len(given) > 1:

@@ -1,4 +1,4 @@
-"""Envelopes over time: histograms of the values in each window, which add up over any blocks of runs."""
+"""Envelopes over time, from histograms of the values in each time window, which can be added over any blocks of runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from starhold.analysis.meter import Array, Window
 
 FINE = 4
-"""Binary digits of the mantissa that number the bins of an octave: sixteen bins."""
+"""The number of leading mantissa bits that select the bin in an octave: sixteen bins."""
 LEAST, OCTAVES = -90, 110
-"""Values from 2^LEAST to 2^(LEAST + OCTAVES) are binned; smaller and larger ones go into the end bins."""
+"""The range of the bins, 2^LEAST to 2^(LEAST + OCTAVES); smaller and larger values go into the end bins."""
 BINS = OCTAVES << FINE
 _SHIFT = 52 - FINE
 _FIRST = (1023 + LEAST) << FINE
@@ -20,9 +20,9 @@ NAME = "envelope"
 
 @dataclass(frozen=True)
 class Envelope:
-    """A quantity over time. For each window, which ends at `times` (s), statistics of the largest values in it of all runs
-    that were not lost: the least, the 5 % quantile, the median, the 95 % quantile, the largest; all (windows,). The
-    quantiles are read off a histogram and right to within 3 %, for angles beyond 150 degrees to within 15 degrees; the
+    """The envelope of a quantity over time. For each window, which ends at `times` (s), statistics over the runs that were
+    not lost of the largest value in the window: minimum, 5 % quantile, median, 95 % quantile, maximum; all (windows,). The
+    quantiles are read off a histogram and accurate to within 3 %, for angles above 150 degrees to within 15 degrees; the
     extremes are exact."""
 
     name: str
@@ -52,14 +52,14 @@ def count(windows: Array) -> tuple[NDArray[np.int64], Array, Array]:
 
 
 def edges() -> Array:
-    """The edges (BINS + 1,) of the bins: those of equal parts of octaves."""
+    """Return the edges (BINS + 1,) of the bins, which are equal parts of octaves."""
     at = np.arange(BINS + 1)
     return np.ldexp(1.0 + (at % (1 << FINE)) / (1 << FINE), LEAST + (at >> FINE))
 
 
 def quantile(counts: NDArray[np.int64], share: float, least: Array, most: Array) -> Array:
-    """Return a quantile of histograms (..., BINS), interpolated linearly in its bin and within the extremes (...); NaN for
-    empty ones."""
+    """Return a quantile (...) of histograms (..., BINS), interpolated linearly within its bin and limited to the extremes
+    (...); NaN for empty histograms."""
     total = counts.sum(axis=-1)
     upto = np.cumsum(counts, axis=-1)
     wanted = share * np.maximum(total - 1, 0)
@@ -77,8 +77,8 @@ def quantile(counts: NDArray[np.int64], share: float, least: Array, most: Array)
 def read(
     counts: NDArray[np.int64], least: Array, most: Array, windows: Mapping[str, Window], times: Array
 ) -> tuple[Envelope, ...]:
-    """Return the envelopes of quantities by name from histograms (windows, quantities, BINS), extremes (windows, quantities)
-    and the times (s) at which windows end."""
+    """Return the envelopes by quantity, from histograms (windows, quantities, BINS), extremes (windows, quantities) and the
+    times (s) at which windows end."""
     low, median, high = (quantile(counts, share, least, most) for share in (0.05, 0.5, 0.95))
     envelopes: list[Envelope] = []
     for place, (name, window) in enumerate(windows.items()):

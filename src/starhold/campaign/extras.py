@@ -1,4 +1,4 @@
-"""Packages that only campaigns need, imported when they are used."""
+"""Imports the packages that only campaigns need when they are used."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""Flies blocks of runs: draws them, makes their lanes, measures them in the kernel itself, and computes their margins."""
+"""Flies blocks of runs: draws their values, makes their lanes, computes metrics in the kernel, and the margins from them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from starhold.trace.device import Device
 
 @dataclass(frozen=True)
 class Source:
-    """A scenario in a form that any process can read again."""
+    """A scenario in a form from which any process can read it again."""
 
     text: str
     where: str
@@ -43,24 +43,24 @@ class Source:
 
     @classmethod
     def of(cls, scenario: Scenario) -> Source:
-        """Where a scenario came from."""
+        """Return the source of a scenario."""
         return cls(scenario.text, scenario.where, scenario.folder, scenario.allow_unstable)
 
     def read(self) -> Scenario:
-        """The scenario, read."""
+        """Read and return the scenario."""
         return parse(self.text, self.where, self.folder, self.allow_unstable)
 
 
 @dataclass
 class Job:
-    """Flies the runs of a campaign; small when pickled, because each process reads the scenario once more."""
+    """Flies the runs of a campaign. Its pickle is small, because each process reads the scenario again."""
 
     source: Source
     table: CampaignTable
     progress: Callable[[str, int], None] | None = None
-    """Called with a law and how many more of its runs were flown, while a block is flown; not from other processes."""
+    """Called with a law and the number of further runs flown, while a block is flown; not in other processes."""
     extras: tuple[str, ...] = ()
-    """Names of metrics that are measured in addition to the campaign's own."""
+    """Names of metrics to measure in addition to the campaign's."""
     _lanes: dict[str, Lanes] = field(default_factory=dict[str, Lanes])
     _meters: dict[str, Meter] = field(default_factory=dict[str, Meter])
 
@@ -89,21 +89,21 @@ class Job:
         return read_dispersions(self.scenario, self.table.over)
 
     def lanes(self, law: str) -> Lanes:
-        """Return the lanes of a law, made at the first request."""
+        """Return the lanes of a law, which are made at the first call."""
         if law not in self._lanes:
             self._lanes[law] = Lanes(self.scenario, law, self.plan)
         return self._lanes[law]
 
     def meter(self, law: str) -> Meter:
-        """Return the meter of a law in the scenario, made at the first request. InputError where a requested metric cannot
-        be measured."""
+        """Return the meter of a law in the scenario, which is made at the first call. InputError where a requested metric
+        cannot be measured."""
         if law not in self._meters:
             loop = build(self.scenario, self.scenario.pick(law))
             self._meters[law] = self._meter_of(loop, loop.gains)
         return self._meters[law]
 
     def _meter_of(self, loop: ClosedLoop, gains: Any) -> Meter:
-        """Return the meter of lanes of a loop; gains: with an array (lanes,) in place of each number that differs."""
+        """Return the meter for lanes of a loop; gains: arrays (lanes,) in place of the numbers that differ."""
         required = self.required.values()
         extras, cones = (*extras_of(required, self.table.metrics), *self.extras), cones_of(required)
         key = "requirement" if cones else "campaign.metrics"
@@ -111,7 +111,7 @@ class Job:
             return study_of(self.scenario.body).meter(self.scenario, loop, gains, extras, cones)
 
     def requirements(self, law: str) -> tuple[Requirement, ...]:
-        """The requirements that runs of a law must keep."""
+        """Return the requirements on runs of a law."""
         return read_requirements(self.required, self.meter(law).units, self.source.where, orbit_of(self.scenario))
 
     def __call__(self, law: str, first: int, count: int, pool: Pool) -> Callable[[], Chunk]:
@@ -155,9 +155,9 @@ class Job:
         progress: Progress | None = None,
         refused: NDArray[np.bool_] | None = None,
     ) -> Callable[[], Metrics]:
-        """Begin to fly runs of a law; the function returned waits for their metrics and the numbers read back, (lanes,), by
-        name. columns: the drawn values; runs: the runs' numbers, which also number their random draws; take: called with
-        metrics and windows of each lot, and the lot; refused: as in `Lanes.lots`; lanes marked there have no numbers."""
+        """Begin to fly runs of a law; the function returned waits for their metrics and the values read back, (lanes,) by
+        name. columns: the drawn values; runs: the numbers of the runs, which select their random numbers; take: called with
+        the metrics and windows of each lot, and the lot; refused: as in `Lanes.lots`; lanes marked there have no values."""
         under_way = [
             (lot, at, numbers, self._begin(lot, pool)) for lot, at, numbers in self.lanes(law).lots(columns, runs, refused)
         ]
@@ -201,7 +201,7 @@ class Job:
 
 
 def by_lots(tell: Callable[[int], None]) -> Progress:
-    """Return the function that reports how many more runs are flown, lot by lot, to one that is called with this number."""
+    """Return a progress function for a kernel that calls `tell` with the number of further runs flown, lot by lot."""
     reported, whole = 0, 0
 
     def progress(done: int, lanes: int) -> None:
@@ -216,8 +216,8 @@ def by_lots(tell: Callable[[int], None]) -> Progress:
 
 
 def scenario_of(job: Job, columns: Mapping[str, NDArray[Any]], run: int) -> Scenario:
-    """Return the scenario of one run by itself: with the drawn values, in columns (1,), in place of the distributions, the
-    number of the run, and no campaign."""
+    """Return the scenario of a single run: with the drawn values, columns (1,), in place of the file's, the number of the
+    run, and without a campaign."""
     change = {**job.plan.change({name: values[0] for name, values in columns.items()}), "campaign": None}
     change |= {"requirement": None}
     if hasattr(job.scenario.table.simulation, "run"):

@@ -1,6 +1,6 @@
-"""Turns drawn values into the numbers that kernels fly: for many runs at once where that gives the bits of each run's own
-scenario, else run by run. Which numbers of a loop a value changes is found by building scenarios with other values and
-comparing them.
+"""Converts drawn values to the numbers that kernels fly: for many runs at once where this gives the same bits as each run's
+own scenario, else run by run. Scenarios with other values are built and compared to determine which numbers of a loop a
+value changes.
 """
 
 import warnings
@@ -30,17 +30,17 @@ Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
 
 TRIES = 64
-"""The number of runs searched for one whose value differs from the first run's."""
+"""The number of runs searched for a value that differs from the first run's."""
 PROBES = 4
-"""The number of runs on which numbers made for many runs at once are first compared with each run's own."""
+"""The number of runs in which numbers made for many runs at once are first compared with those of each run alone."""
 _FORM = -1
-"""Takes the place of all that is not a number: the kernel itself."""
+"""The index that stands for everything that is not a number, the kernel itself."""
 
 
 @dataclass(frozen=True)
 class Lot:
-    """Lanes that one kernel flies: run numbers (lanes,), a loop of the same form, carries (numbers, lanes) and phases with
-    an array (lanes,) in place of each number that differs."""
+    """Lanes that one kernel flies: run numbers (lanes,), a loop of their structure, carries (numbers, lanes), and phases
+    with an array (lanes,) in place of each number that differs."""
 
     runs: NDArray[np.int64]
     loop: ClosedLoop
@@ -76,16 +76,16 @@ class Lanes:
         self.flown = self._read_back()
 
     def exact(self, columns: Columns) -> Flat:
-        """Return the numbers of one run, from its own scenario; columns: (1,)."""
+        """Return the numbers of one run, built from its own scenario; columns: (1,)."""
         return next(self._each(columns, [0]))
 
     def _each(self, columns: Columns, runs: Sequence[int]) -> Iterator[Flat]:
-        """Yield the numbers of each run, from its own scenario. InputError names the run."""
+        """Yield the numbers of each run, built from its own scenario. InputError names the run."""
         drawn = ({name: values[place] for name, values in columns.items()} for place in range(len(runs)))
         others = variants(self._bare, (self.plan.change(one) for one in drawn))
         for run in runs:
             try:
-                # Warnings are about the file, not about each run.
+                # Warnings concern the file, not each run.
                 with warnings.catch_warnings(action="ignore"):
                     other = next(others)
                     flat = Flat.of(build(other, other.pick(self.law), drawn=True), self.steps)
@@ -95,7 +95,7 @@ class Lanes:
                 raise InputError(where, error.key, error.given, error.allowed) from None
 
     def _tried(self, columns: Columns, place: int, run: int) -> Flat | None:
-        """Return the numbers of one of these runs; None where its scenario is refused."""
+        """Return the numbers of one of these runs, or None where its scenario is refused."""
         try:
             return next(self._each(_one(columns, place), [run]))
         except InputError:
@@ -104,9 +104,9 @@ class Lanes:
     def lots(
         self, columns: Columns, runs: NDArray[np.int64], refused: NDArray[np.bool_] | None = None
     ) -> Iterator[tuple[Lot, NDArray[np.int64], dict[str, Array]]]:
-        """Yield the lanes of these runs (lanes,), with the draws of the columns, in lots: with the index of each lane among
-        all, and the numbers read back. InputError where a run's scenario is refused; where `refused` (lanes,) is given such
-        lanes are left out and marked there."""
+        """Yield the lanes of these runs (lanes,) with the drawn columns, in lots: each lot with the indices of its lanes and
+        the values read back from it. InputError where a run's scenario is refused; if the mask `refused` (lanes,) is given,
+        such lanes are marked there and left out."""
         impossible = self.scenario.hooks.refused(self.scenario, self.moving.by_key(columns))
         if impossible is not None and impossible.any():
             if refused is None:
@@ -143,14 +143,14 @@ class Lanes:
         return _FORM in places or not places.isdisjoint(self.base.places(name))
 
     def _others(self, dispersion: Dispersion, more: Columns) -> list[int]:
-        """Return at most two of the first runs, whose columns are in `more`, in which a value of the dispersion differs from
-        the very first."""
+        """Return at most two runs, among the first ones with the columns `more`, in which a value of the dispersion differs
+        from that of run 0."""
         names = dispersion.columns
         return [run for run in range(self.plan.runs)[:TRIES] if any(more[n][run] != self.first[n][0] for n in names)][:2]
 
     def _moved_by(self, dispersion: Dispersion, more: Columns, others: Sequence[int]) -> set[int]:
-        """Return the indices of the numbers that change when only the values of one dispersion change, as in these other
-        runs; more: columns of the first runs."""
+        """Return the indices of the numbers that change when only one dispersion has the values of the runs `others`; more:
+        columns of the first runs."""
         names = dispersion.columns
         moved: set[int] = set()
         for run in others:
@@ -165,8 +165,8 @@ class Lanes:
         return moved if others else {_FORM}
 
     def _agrees(self, columns: Columns, runs: NDArray[np.int64], strict: bool = True) -> bool:
-        """Return whether the numbers of these runs, made at once, are those of each run's own scenario. InputError where one
-        is refused; if not strict, that counts as a difference."""
+        """Return whether the numbers of these runs made at once equal those of each run's own scenario. InputError where a
+        scenario is refused; if not strict, this counts as a difference."""
         lot = self._together(columns, runs)
         if lot is None:
             return False
@@ -177,7 +177,8 @@ class Lanes:
 
     @cached_property
     def _follows(self) -> dict[int, str]:
-        """Return the columns that numbers are equal to, by the numbers' indices, judged by the first run."""
+        """The column of the drawn value that a number equals, by the index of each such number, judged by the first
+        run."""
         followed: dict[int, str] = {}
         for dispersion in self.plan.dispersions:
             for place in self.moved[dispersion.called] - {_FORM}:
@@ -188,14 +189,14 @@ class Lanes:
         return followed
 
     def _together(self, columns: Columns, runs: NDArray[np.int64]) -> Lot | None:
-        """Make lanes at once; None where that is impossible."""
+        """Return lanes made at once, or None where this is impossible."""
         try:
             return self._made(columns, runs)
         except (ValueError, TypeError, RecordingError):
             return None
 
     def _made(self, columns: Columns, runs: NDArray[np.int64]) -> Lot:
-        """Make lanes from numbers that are values, and from those that equations compute from values."""
+        """Return lanes made at once: some numbers are drawn values, the others are computed from them by equations."""
         base, every = self.base, set[int]().union(*self.moved.values())
         rows: dict[int, Array] = {place: columns[name].astype(float) for place, name in self._follows.items()}
         like = base.loop.carry()
@@ -220,14 +221,14 @@ class Lanes:
         return Lot(runs, base.loop, carries, phases)
 
     def _apart(self, flats: Sequence[Flat], runs: NDArray[np.int64]) -> Lot:
-        """Make lanes of one form one by one."""
+        """Return lanes of one structure, made one by one."""
         loop, phases = flats[0].loop, stacked([flat.loop.phases(self.steps) for flat in flats])
         carries = np.array([flat.numbers[: len(numbers_of(loop.carry()))] for flat in flats]).T
         return Lot(runs, loop, np.ascontiguousarray(carries), tuple(phases))
 
     def _read_back(self) -> tuple[str, ...]:
-        """Return the names of numbers that show each dispersion: those that are its values, else all that it changes; where
-        several are always equal, one of them, preferably of the flying craft and not of the nominal model."""
+        """Return the names of the numbers that show each dispersion: those equal to its values, else all that it changes. Of
+        several that are always equal one is named, preferably that of the true craft and not of the nominal model."""
         kept: list[int] = []
         alike = [flat for flat in self._varied if flat.names == self.base.names]
         for dispersion, places in zip(self.plan.dispersions, self.moved.values(), strict=True):
@@ -242,15 +243,15 @@ class Lanes:
         return tuple(self.base.names[place] for place in sorted(set(kept)))
 
     def _readings(self, lot: Lot) -> dict[str, Array]:
-        """Return the numbers of a lot that are read back from the flown arrays; NaN where its form has no such number."""
+        """Return the numbers read back from a lot's flown arrays, (lanes,) by name; NaN where its structure lacks one."""
         numbers = _numbers(lot)
         missing = np.full(len(lot.runs), np.nan)
         return {f"flown.{shown_name(lot.loop, name)}": numbers.get(name, missing) for name in self.flown}
 
 
 def _phases(phases: Sequence[Phase], begin: int, rows: Mapping[int, Array]) -> tuple[Phase, ...]:
-    """Return phases with these rows (lanes,), by the indices of the numbers that they replace; the first has the index
-    `begin`."""
+    """Return phases with some numbers replaced by rows (lanes,), given by index; the first number of the phases has the
+    index `begin`."""
     changed: list[Phase] = []
     place = begin - 1
     before: Any = None

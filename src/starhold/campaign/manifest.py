@@ -1,4 +1,4 @@
-"""The manifest in a campaign's folder, which states what is flown, and the comparison of two manifests."""
+"""The manifest in a campaign's folder, which defines what is flown, and the comparison of two manifests."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ FILE = "manifest.json"
 _LONGEST_VALUE = 60
 _MISSING = object()
 _KEYS = {"version": "starhold_version", "settings": "campaign"}
-"""The names in the file of fields whose names differ there."""
+"""The fields whose keys in the file differ from their names, with these keys."""
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """A statement of what a campaign flies. scenario, text: name and whole text of the scenario file. settings: all else
-    that determines results, as in a file: dispersions, requirements, sampling, and the hashes of other files that the
-    scenario reads, but not the number of runs. laws: names of the laws in order; each flies all runs. runs, chunk: numbers
-    of runs, of a law and of a full chunk. Results do not depend on `chunk`. seed: that of the draws. extensible: whether the
-    draws of a run are the same for any number of runs, which Latin hypercubes are not. columns: names of the columns of each
+    """The definition of a campaign. scenario, text: name and whole text of the scenario file. settings: everything else that
+    determines results, as in a file: dispersions, requirements, sampling, and the hashes of other files that the scenario
+    reads, but not the number of runs. laws: names of the laws in order; each flies all runs. runs, chunk: numbers of runs of
+    each law and of a full chunk; results do not depend on `chunk`. seed: that of the draws. extensible: whether the draws of
+    a run are the same for any number of runs, which is false for Latin hypercubes. columns: names of the columns of each
     law, known once its first chunk is stored. folder, allow_unstable: the folder to which file names in the text are
     relative, and whether gains known to be unstable are accepted; results depend on neither.
     """
@@ -49,7 +49,7 @@ class Manifest:
     allow_unstable: bool = False
 
     def determining(self) -> dict[str, Any]:
-        """Everything that results depend on, by the keys that differences name."""
+        """Everything on which results depend, by the keys that `difference` names."""
         settings = cast(dict[str, Any], plain(self.settings))
         settings.pop("runs", None)
         tables = _tables(self.text)
@@ -59,18 +59,18 @@ class Manifest:
         return {"campaign": settings, "": tables, **others}
 
     def fingerprint(self) -> str:
-        """SHA-256, in hexadecimal, of everything that results depend on."""
+        """The SHA-256, in hexadecimal, of everything on which results depend."""
         return hashlib.sha256(json.dumps(self.determining(), sort_keys=True).encode()).hexdigest()
 
     def to_json(self) -> str:
-        """The manifest as the text of a JSON file."""
+        """Return the manifest as the text of a JSON file."""
         content = {_KEYS.get(one.name, one.name): plain(getattr(self, one.name)) for one in fields(self)}
         content["fingerprint"] = self.fingerprint()
         return json.dumps({**content, "seal": _seal(content)}, indent=2, allow_nan=False) + "\n"
 
     @classmethod
     def from_json(cls, text: str, where: str) -> Manifest:
-        """Read the manifest in a text; InputError where it holds none, or was changed since it was written."""
+        """Return the manifest in a text. InputError where it holds none, or was changed since it was written."""
         try:
             data = json.loads(text)
             # A text with a valid seal has the types that were written.
@@ -93,7 +93,7 @@ class Manifest:
 
 
 def plain(value: Any) -> Any:
-    """Return a value in the types of JSON; numbers that are not finite become text, as does any unknown type."""
+    """Return a value converted to types of JSON; infinities, NaN and values of unknown types become text."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in cast(Mapping[Any, Any], value).items()}
     if isinstance(value, np.ndarray | np.generic):
@@ -121,7 +121,7 @@ def difference(new: Any, old: Any, key: str) -> str | None:
     mine, theirs = _written(new), _written(old)
     if mine == theirs:
         return None
-    # For two long values, only the parts that differ.
+    # Of two long values, only the parts that differ are shown.
     pairs = zip(mine, theirs, strict=False)
     same = next((place for place, (a, b) in enumerate(pairs) if a != b), min(len(mine), len(theirs)))
     if same > _LONGEST_VALUE // 2:
@@ -130,20 +130,20 @@ def difference(new: Any, old: Any, key: str) -> str | None:
 
 
 def _seal(content: Mapping[str, Any]) -> str:
-    """Return SHA-256, in hexadecimal, of a manifest's file without its folder, because a scenario may be moved."""
+    """Return the SHA-256, in hexadecimal, of a manifest's content without its folder, because a scenario may be moved."""
     sealed = {key: value for key, value in content.items() if key != "folder"}
     return hashlib.sha256(json.dumps(sealed, sort_keys=True).encode()).hexdigest()
 
 
 def _tables(text: str) -> dict[str, Any]:
-    """Return the tables of a scenario's text, without its comments; lines, if it is not TOML."""
+    """Return the tables of a scenario's text, without comments; its lines where it is not TOML."""
     try:
         tables = cast(dict[str, Any], plain(tomllib.loads(text)))
     except (ValueError, RecursionError):
         return {"line": text.splitlines()}
     campaign = tables.get("campaign")
     if isinstance(campaign, dict):
-        # These are compared as numbers, so that a default is no change.
+        # These are compared as validated numbers, so that writing out a default counts as no change.
         for key in ("runs", "seed"):
             cast(dict[str, Any], campaign).pop(key, None)
     return tables

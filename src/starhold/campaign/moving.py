@@ -1,5 +1,6 @@
-"""Computes a loop's numbers from drawn values by one equation, recorded once and evaluated for all lanes at once. By their
-own formulas, lane by lane where there is no way at once: a law's gains, and what a part prepares that no equation records.
+"""Computes a loop's numbers from drawn values by one equation, recorded once and evaluated for all lanes at once. A law's
+designed gains, and numbers that a part prepares without a recordable equation, are computed separately, if necessary lane by
+lane.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -28,7 +29,7 @@ Columns: TypeAlias = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Ready(Fitted):
-    """A part in a loop with what it prepared."""
+    """A part of a loop together with the numbers that it has prepared."""
 
     numbers: Any = ()
 
@@ -37,7 +38,7 @@ class Ready(Fitted):
 
 
 class Moving:
-    """The numbers that a law's loop has under the values of dispersions."""
+    """Computes the numbers of a law's loop for drawn values of the dispersions."""
 
     def __init__(self, scenario: Scenario, law: LawEntry, base: Flat, dispersions: tuple[Dispersion, ...]) -> None:
         self.scenario, self.law, self.base = scenario, law, base
@@ -48,7 +49,8 @@ class Moving:
         self._compiled: tuple[Compiled, list[str]] | None = None
 
     def by_key(self, columns: Columns, known: bool = False) -> dict[str, Array]:
-        """Return the values that are numbers, (components..., lanes), by key; `known`: only those known to laws."""
+        """Return the numerical values, (components..., lanes) by key; `known`: whether to return only those known to
+        laws."""
         return {
             key: np.moveaxis(values, 0, -1)
             for one in self.drawn
@@ -57,8 +59,8 @@ class Moving:
         }
 
     def numbers(self, columns: Columns) -> dict[str, Array]:
-        """Return the numbers that differ, (lanes,), by their names in a carry or a phase. ValueError or RecordingError where
-        no equation gives them."""
+        """Return the numbers that differ between lanes, (lanes,) by their names in a carry or a phase. ValueError or
+        RecordingError where no equation gives them."""
         arguments = self._arguments(columns)
         varying = [leaf for leaf in leaves(arguments) if isinstance(leaf, np.ndarray)]
         if not varying:
@@ -67,8 +69,8 @@ class Moving:
         return dict(zip(names, equation.over(np.array(varying)), strict=True))
 
     def _arguments(self, columns: Columns) -> tuple[Any, ...]:
-        """The arguments of the equation: the flying craft, the nominal model, the parameters of parts, and what those parts
-        prepare that no equation follows."""
+        """Return the arguments of the equation: the true craft, the nominal model, the parameters of parts, and the numbers
+        that parts prepare without a recordable equation."""
         hooks, every = self.scenario.hooks, self.by_key(columns)
         true, known = hooks.drawn(self.scenario, every), self.by_key(columns, known=True)
         alike = self.scenario.known is self.scenario and len(known) == len(every)
@@ -90,11 +92,12 @@ class Moving:
 
     @cached_property
     def _tables(self) -> Any:
-        """The parts' tables as they are written."""
+        """The raw [[part]] tables of the scenario."""
         return read_toml(self.scenario.text, self.scenario.where)["part"]
 
     def _is_apart(self, fitted: Fitted) -> bool:
-        """Return whether no equation records what a part prepares from parameters with arrays (lanes,)."""
+        """Return whether a part prepares its numbers, from parameters with arrays (lanes,), without a recordable
+        equation."""
         if fitted.name not in self._apart:
             count = sum(isinstance(leaf, np.ndarray) for leaf in leaves(fitted.params))
 
@@ -123,7 +126,7 @@ class Moving:
         return self._compiled
 
     def _named(self, true: Any, supposed: Any, params: Mapping[str, Any], ready: Mapping[str, Any]) -> list[tuple[str, Any]]:
-        """The numbers of the loop with their names: the initial carry, and the phases."""
+        """Return the names and numbers of the initial carry and of the phase."""
         loop = self.base.loop
         moved = self.scenario.hooks.flown(self.scenario, loop, true, supposed)
         parts = tuple(replace(one, params=params[one.name]) if one.name in params else one for one in moved.parts)
@@ -137,8 +140,8 @@ class Moving:
         ]
 
     def gains(self, columns: Columns, nominal: Any) -> dict[str, Array]:
-        """Return by name the gains of each lane from the law's form and the nominal craft, which has arrays (lanes,) where
-        lanes differ; none for a law without a form. ValueError where a lane has none."""
+        """Return the gains of each lane, by name, from the law's design form and the nominal craft, which has arrays
+        (lanes,) where lanes differ; empty for a law without a form. ValueError where the design of a lane fails."""
         spec, law = self.law.spec, self.law.law
         if self.law.form is None:
             return {}
@@ -167,7 +170,7 @@ def _differ(value: Any) -> bool:
 
 
 def _each(value: Any, lanes: int) -> Iterable[Any]:
-    """Return a structure with arrays (lanes,) as that of each lane, with numbers."""
+    """Return the structure of each lane, with a number in place of each array (lanes,)."""
     if isinstance(value, np.ndarray) and value.ndim:
         return value.astype(float).tolist()
     parts = [_each(part, lanes) for part in cast(Any, value)] if isinstance(value, tuple) else []
@@ -177,8 +180,8 @@ def _each(value: Any, lanes: int) -> Iterable[Any]:
 
 
 def _joined(every: Sequence[Any]) -> Any:
-    """Return the structures of many lanes as one, with an array (lanes,) in place of each number. ValueError where they
-    differ in more than numbers."""
+    """Return the structures of many lanes joined into one, with an array (lanes,) in place of each number. ValueError where
+    they differ in more than numbers."""
     apart = [list(leaves(one)) for one in every]
     form = [None if isinstance(leaf, float) else leaf for leaf in apart[0]]
     if any([None if isinstance(leaf, float) else leaf for leaf in row] != form for row in apart):
@@ -188,5 +191,5 @@ def _joined(every: Sequence[Any]) -> Any:
 
 
 def _rows(new: Array) -> Any:
-    """An array (components..., lanes) as nested tuples of arrays (lanes,)."""
+    """Return an array (components..., lanes) as nested tuples of arrays (lanes,)."""
     return tuple(_rows(row) for row in new) if new.ndim > 1 else new

@@ -1,4 +1,4 @@
-"""One chunk as the bytes of one Parquet file: its rows as columns, its counts and extremes in the schema's metadata.
+"""Stores a chunk as one Parquet file: its rows as columns, its counts and extremes in the schema's metadata.
 
 A missing number (NaN) is stored as null, so that every reader of Parquet omits it from averages. Only the counts are
 compressed, because results are random in nearly all of their bits.
@@ -23,7 +23,7 @@ FINGERPRINT, LAW, FIRST, COUNTS, EXTREMES = (
 
 
 def encode(chunk: Chunk, fingerprint: str) -> bytes:
-    """The file's bytes. fingerprint: that of the campaign's manifest."""
+    """Return the bytes of a chunk's file. fingerprint: that of the campaign's manifest."""
     pyarrow, parquet = extra("pyarrow"), extra("pyarrow.parquet")
     table = pyarrow.table({name: _to_arrow(values, pyarrow) for name, values in chunk.rows.items()})
     words = [name for name, values in chunk.rows.items() if _is_text(values)]
@@ -43,7 +43,7 @@ def belongs(path: Path, law: str, first: int, count: int, fingerprint: str) -> b
 
 
 def names(path: Path) -> tuple[str, ...]:
-    """The columns' names in the file's order."""
+    """Return the names of a file's columns in order."""
     return tuple(extra("pyarrow.parquet").read_schema(path).names)
 
 
@@ -55,7 +55,7 @@ def read(path: Path, columns: list[str]) -> dict[str, NDArray[Any]]:
 
 
 def added_up(path: Path) -> tuple[Counts, Extremes]:
-    """The counts and the extremes of the file's chunk."""
+    """Return the counts and the extremes of the chunk in a file."""
     metadata = _metadata(path)
     return cast(Counts, _unpack(metadata[COUNTS])), cast(Extremes, _unpack(metadata[EXTREMES]))
 
@@ -76,7 +76,7 @@ def _to_arrow(values: NDArray[Any], pyarrow: Any) -> Any:
 
 
 def _pack(arrays: dict[str, NDArray[Any]]) -> str:
-    """Arrays as text: JSON of their shapes, and their compressed bytes in base 64."""
+    """Return arrays as text: JSON with their shapes and their compressed bytes in base 64."""
     shapes: dict[str, tuple[str, list[int]]] = {}
     parts: list[bytes] = []
     for name, values in sorted(arrays.items()):

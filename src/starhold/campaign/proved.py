@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import unflatten
-from starhold.analysis.departure import momentum_of, shown_at, start_inside, value_of
+from starhold.analysis.departure import height_of, momentum_of, shown_at, start_inside
 from starhold.analysis.meter import Meter, Metrics, tail_start
 from starhold.analysis.premise_notes import PREMISES
 from starhold.campaign.job import Job
@@ -252,9 +252,7 @@ def _starts_inside(about: Subject, lot: Lot) -> NDArray[np.bool_]:
     # The true start, not as measured.
     quiet, n = about.issued.loop.without("sensor", "estimator"), about.claim.numbers
     shown = shown_at(quiet, quiet.start._replace(attitude=begun.attitude, rate=begun.rate))
-    return (value_of(about.claim.programs, quiet, shown) <= n["start"]) & (
-        momentum_of(quiet, shown) <= n.get("momentum", math.inf)
-    )
+    return (height_of(about.claim, quiet, shown) <= n["start"]) & (momentum_of(quiet, shown) <= n.get("momentum", math.inf))
 
 
 def _apart(about: Subject, loop: ClosedLoop) -> tuple[bool, bool]:

@@ -19,13 +19,13 @@ _CLOSED = {
     "autoload_known_extensions": False,
     "temp_directory": "",
 }
-"""A query reads only the view: no file, no network, no disk to spill to."""
+"""Settings that restrict a query to the view: no files, no network, no spilling to disk."""
 
 
 def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> DataFrame:
-    """Answer one SELECT about `runs`: a row for each stored run of each law, with the campaign's columns and `law`. Columns
-    that a law lacks are null in its rows, as are numbers that a run lacks. Unusable chunks are left out, with a line to
-    `tell`; without it they are an InputError, as is anything that DuckDB refuses.
+    """Return the result of one SELECT from `runs`, a view with a row for each stored run of each law, the campaign's columns
+    and `law`. Columns that a law lacks are null in its rows, as are numbers that a run lacks. Unusable chunks are left out
+    and reported to `tell`; without it they are an InputError, as is anything that DuckDB refuses.
     """
     store = Store.open(folder)
     duckdb, dataset = extra("duckdb"), extra("pyarrow.dataset")
@@ -38,7 +38,7 @@ def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> 
     if not flown:
         raise InputError(str(folder), "", "no runs", "a folder with flown runs")
     with duckdb.connect(":memory:", config=_CLOSED) as connection:
-        # Through Arrow, so that DuckDB needs no access to files, not even to these, which it could also write.
+        # Through Arrow, so that DuckDB needs no access to any files, which it could also write.
         for number, law in enumerate(flown):
             connection.register(f"chunks {number}", dataset.dataset(files[law], format="parquet"))
         quoted = [law.replace("'", "''") for law in flown]
@@ -53,7 +53,7 @@ def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> 
 
 
 def _check(connection: Any, sql: str, duckdb: Any) -> None:
-    """Raise InputError where a text is not a single query."""
+    """Raise InputError unless a text is a single SELECT."""
     kinds = [statement.type for statement in connection.extract_statements(sql)]
     if len(kinds) != 1:
         raise InputError("query", "", f"{len(kinds)} statements", "one SELECT")

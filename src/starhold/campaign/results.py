@@ -1,4 +1,4 @@
-"""The results of a campaign, law by law: distributions, envelopes, verdicts, drivers, and the runs worth flying again."""
+"""The results of a campaign by law: distributions, envelopes, verdicts, drivers, and runs worth flying again."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
 Array: TypeAlias = NDArray[np.float64]
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-"""Quantiles of a metric's distribution: least, 5 %, quarter, median, three quarters, 95 %, largest."""
+"""Quantiles of a metric's distribution: minimum, 5 %, 25 %, median, 75 %, 95 %, maximum."""
 
 ROUNDING = 1e-12
-"""The share of a bound by which rounding may take a flight beyond it."""
+"""The share of a bound by which rounding may make a flight exceed it."""
 
 
 CHANCE = 1e-6
-"""The probability with which as many flights as contradict a claim with a share would be beyond it by chance."""
+"""The probability below which the number of flights outside a claim's share is not attributed to chance."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """The distribution of a metric over the runs that have it. quantiles: those of QUANTILES, by linear interpolation, as
-    `numpy.quantile` gives them; edges (bins + 1,) and counts (bins,) of a histogram, its edges the same for all laws; runs:
-    all of them; missing: those without the metric."""
+    """The distribution of a metric over the runs that have it. quantiles: those of QUANTILES, by linear interpolation as in
+    `numpy.quantile`; edges (bins + 1,) and counts (bins,): a histogram, with the same edges for all laws; runs: number of
+    all runs; missing: number of runs without the metric."""
 
     metric: str
     unit: str
@@ -53,7 +53,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class Again:
-    """A run that is worth flying again: its number, why, and the command."""
+    """A run worth flying again: its number, the reason, and the command."""
 
     run: int
     why: str
@@ -62,10 +62,10 @@ class Again:
 
 @dataclass(frozen=True)
 class Bracket:
-    """The worst value of a metric: *flown <= true <= proved*, or the reverse where `at_most` is false and less is worse.
-    flown: the worst of the runs and of a search over the dispersions' box, with the scenario file of that run (NaN: a run
-    without the metric, which is worse than any number); proved: a bound of the same quantity for the same flights, with its
-    basis; None where nothing is proved of the metric."""
+    """Bounds on the worst value of a metric: *flown <= true <= proved*, or reversed if `at_most` is false and less is worse.
+    flown: the worst value in the runs and in a search over the box of the dispersions, with the scenario file of that run
+    (NaN: a run without the metric, which is worse than any number); proved: a bound on the same quantity for the same
+    flights, with its basis; None where no bound is proved."""
 
     metric: str
     unit: str
@@ -78,7 +78,7 @@ class Bracket:
 
     @property
     def contradicted(self) -> bool:
-        """Whether a flight exceeds the proved bound by more than rounding: a fault of starhold."""
+        """Whether a flight exceeds the proved bound by more than rounding, which is an error in starhold."""
         if self.proved is None:
             return False
         room = ROUNDING * abs(self.proved)
@@ -87,9 +87,9 @@ class Bracket:
 
 @dataclass(frozen=True)
 class Within:
-    """A metric of the flights that keep the premises of a claim, from when they do, lies between the worst flown and the
-    bound proved. covered: how many these flights are; beyond: those beyond the bound by more than the integration's error,
-    or without a value."""
+    """The worst value flown and the bound proved for a metric of flights that meet a claim's premises, from the time when
+    they do. covered: the number of these flights; beyond: the number of those that exceed the bound by more than the
+    integration error, or have no value."""
 
     metric: str
     unit: str
@@ -101,11 +101,11 @@ class Within:
 
 @dataclass(frozen=True)
 class ByClaim:
-    """A claim about a law's loop as it flies, compared with its flights. about: the name of its certificate, that of the
-    law or one that also tells its mode; text: the claim, or why nothing is claimed of them; runs: flights that were
-    compared with it; left: how many do not meet its premises, by the reason; share: of flights of which the claim holds,
-    None for all; misled: in how many of the others the law was told more wrongly than the claim assumes for this share,
-    None where what it is told is not recorded; within: the metrics that it bounds."""
+    """A claim about a law's loop as it flies, compared with its flights. about: the name of its certificate, which names the
+    law and, for a law of modes, the mode; text: the claim, or the reason why there is none; runs: the number of flights
+    compared; left: the numbers of flights that do not meet its premises, by reason; share: the share of flights for which
+    the claim holds, None for all; misled: the number of flights outside it in which the measurement error exceeded what the
+    claim assumes for this share, None where measurements are not recorded; within: the metrics that the claim bounds."""
 
     about: str
     text: str
@@ -117,12 +117,12 @@ class ByClaim:
 
     @property
     def covered(self) -> int:
-        """The number of flights that have the premises of the claim."""
+        """The number of flights that meet the premises of the claim."""
         return self.runs - sum(self.left.values())
 
     def is_rare(self, failures: int, runs: int) -> bool:
-        """Whether `failures` of the runs may be outside the share: the probability of as many is more than `CHANCE`. Each
-        run has its own noise, however the dispersions are drawn."""
+        """Return whether `failures` of the runs may be outside the share by chance: the probability of so many is more than
+        `CHANCE`. Each run has its own noise, regardless of how the dispersions are drawn."""
         if self.share is None or not failures:
             return not failures
         from starhold.campaign.verdicts import failure_bounds
@@ -131,7 +131,7 @@ class ByClaim:
 
     @property
     def contradicted(self) -> bool:
-        """Whether flights contradict the claim, or the share of them in which its assumption on noise holds."""
+        """Whether flights contradict the claim, or the share of flights that it assumes to meet its bound on noise."""
         counts = [(self.misled or 0, self.covered), *((one.beyond, one.covered) for one in self.within)]
         return not all(self.is_rare(*pair) for pair in counts)
 
@@ -149,11 +149,11 @@ class LawResult:
     verdicts: tuple[Verdict, ...]
     drivers: Drivers | None
     indices: Mapping[str, Morris | Sobol | Refused] = field(default_factory=dict[str, Any])
-    """Sensitivity of metrics, by their names, if the sampling was designed for it."""
+    """Sensitivity indices by metric, if the sampling was designed for them."""
     again: tuple[Again, ...] = ()
     brackets: tuple[Bracket, ...] = ()
     claims: tuple[ByClaim, ...] = ()
-    """The brackets by claims, one for each mode of a law of modes; none unless a proof was requested."""
+    """The comparisons with claims, one for each mode of a law of modes; empty unless a proof was requested."""
 
     def __repr__(self) -> str:
         judged = "".join(f"; {verdict.name} {verdict.outcome}" for verdict in self.verdicts)
@@ -162,15 +162,15 @@ class LawResult:
 
 @dataclass(frozen=True)
 class CampaignResult:
-    """A whole campaign, in its folder: the number of runs of each law, how they were sampled, the digest of its results
-    (SHA-256), the seconds that flying took this time, and the number of runs flown in them."""
+    """The results of a whole campaign: its folder, the number of runs of each law, the sampling, the digest (SHA-256) of the
+    results, the seconds that flying took this time, and the number of runs flown in them."""
 
     name: str
     folder: Path
     runs: int
     sampling: str
     over: Mapping[str, str]
-    """Each dispersed key, with a description of its distribution."""
+    """The dispersed keys with descriptions of their distributions."""
     laws: tuple[LawResult, ...]
     digest: str
     seconds: float
@@ -179,30 +179,30 @@ class CampaignResult:
 
     @property
     def met(self) -> bool | None:
-        """Whether every requirement is met by every law; None where some are not decided and none is missed."""
+        """Whether every law meets every requirement; None where some are not decided and none is missed."""
         outcomes = {verdict.outcome for law in self.laws for verdict in law.verdicts}
         return False if "missed" in outcomes else None if "not decided" in outcomes else True
 
     @property
     def contradicted(self) -> bool:
-        """Whether a flight contradicts a proof, which is a fault of starhold."""
+        """Whether a flight contradicts a proof, which is an error in starhold."""
         every = (one for law in self.laws for one in (*law.brackets, *law.claims))
         return any(one.contradicted for one in every)
 
     def frame(self) -> DataFrame:
-        """A row for each run of each law: `law`, `run`, drawn and flown values, metrics, margins."""
+        """Return a row for each run of each law: `law`, `run`, drawn and flown values, metrics, margins."""
         return self.query("SELECT * FROM runs ORDER BY law, run")
 
     @shortly
     def query(self, sql: str) -> DataFrame:
-        """Answer a SELECT about `runs`. InputError where that is impossible."""
+        """Return the result of a SELECT from `runs`. InputError where the query is refused."""
         from starhold.campaign.query import query
 
         return query(self.folder, sql)
 
     @shortly
     def again(self, run: int, law: str | None = None) -> FlownAgain:
-        """Fly one run again and record it. InputError where there is no such run."""
+        """Fly one run again and return it with a recording. InputError where there is no such run."""
         from starhold.campaign.again import fly_again
 
         return fly_again(self.folder, run, law)

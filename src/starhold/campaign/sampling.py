@@ -1,4 +1,4 @@
-"""Plans of a campaign: the numbers that each run draws, which are the same for any chunks and on any machine."""
+"""Plans of a campaign: the values drawn for each run, which are the same for any division into chunks and on any machine."""
 
 import hashlib
 from collections.abc import Iterator, Mapping
@@ -19,11 +19,11 @@ from starhold.scenario.making import path_of
 
 SAMPLINGS = ("random", "sobol", "latin-hypercube", "morris", "saltelli")
 LEVELS = 4
-"""The number of values of each uniform in Morris's design, the middles of as many equal parts."""
+"""The number of levels of each uniform in Morris's design, the middles of as many equal parts of [0, 1]."""
 INNERMOST = 2.0**-53
-"""The least uniform, and the distance of the greatest from 1."""
+"""The least uniform, and 1 minus the greatest."""
 BITS = 52
-"""The bits of a random uniform: with half a unit added, as many as floats hold exactly."""
+"""The number of random bits in a uniform; half a unit of the last bit is added, which floats still represent exactly."""
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class Plan:
     """The draws of all runs of a campaign: the dispersions, the placement of their uniforms, the seed, and the number of
     runs.
 
-    random: independent, by a counter-based generator of its own for each dispersion, keyed by the seed and its keys, so that
-    the draws for one key do not depend on the others. sobol: a scrambled Sobol sequence over all dispersions, best with a
-    power of 2 of runs. latin-hypercube: each uniform falls once into each of as many equal parts as there are runs. morris:
-    SALib's design for elementary effects (Morris 1991), analysed with uniforms from 0 to 1 although `LEVELS` lie within.
+    random: independent, by one counter-based generator per dispersion, keyed by the seed and its keys, so that the draws for
+    one key do not depend on the others. sobol: a scrambled Sobol sequence over all dispersions, best with a power of 2 of
+    runs. latin-hypercube: [0, 1] is divided into as many equal parts as there are runs, and each uniform falls once into
+    each. morris: SALib's design for elementary effects (Morris 1991), analysed as if its levels reached from 0 to 1.
     saltelli: crossings of pairs of points for Sobol indices (see `sensitivity.saltelli_design`).
 
-    InputError where there is no such sampling, or where the number of runs does not fit its design; `where` names the
-    scenario in it."""
+    InputError for an unknown sampling, or where the number of runs does not fit the design; `where`: the scenario's name in
+    it."""
 
     dispersions: tuple[Dispersion, ...]
     sampling: str
@@ -74,17 +74,18 @@ class Plan:
 
     @property
     def block(self) -> int:
-        """The runs of one group of a design: D + 1 for Morris, 2 D + 2 for Saltelli, with D uniforms; else 1."""
+        """The number of runs in a group of the design: D + 1 for Morris, 2 D + 2 for Saltelli, with D uniforms; else 1."""
         return {"morris": self.dims + 1, "saltelli": 2 * self.dims + 2}.get(self.sampling, 1)
 
     @cached_property
     def dims(self) -> int:
-        """The number of uniforms that a run uses."""
+        """The number of uniforms per run."""
         return sum(dispersion.dims for dispersion in self.dispersions)
 
     @property
     def factors(self) -> tuple[str, ...]:
-        """The names of the uniforms: that of the column if it has only one, else the key and its index from 1."""
+        """The names of the uniforms: the column's name if the dispersion has one uniform, else the key and an index from
+        1."""
         names: list[str] = []
         for dispersion in self.dispersions:
             name, dims = dispersion.called, dispersion.dims
@@ -95,7 +96,7 @@ class Plan:
         return tuple(names)
 
     def unit(self, first: int, count: int) -> Array:
-        """Return uniforms (dims, count), strictly between 0 and 1, of the runs from `first` on."""
+        """Return the uniforms (dims, count), strictly between 0 and 1, of `count` runs from `first` on."""
         if not 0 <= first <= first + count <= self.runs:
             raise ValueError(f"runs {first} to {first + count - 1} of {self.runs}")
         if not self.dims or not count:
@@ -117,24 +118,24 @@ class Plan:
         return (unit * LEVELS - 0.5) / (LEVELS - 1) if self.sampling == "morris" else unit
 
     def _key(self, dispersion: Dispersion) -> int:
-        """Return 128 bits that no other seed or dispersion shares."""
+        """Return 128 bits that identify the seed and the dispersion."""
         label = f"starhold campaign {self.seed} {dispersion.called}"
         return int.from_bytes(hashlib.sha256(label.encode()).digest()[:16], "little")
 
     def columns(self, first: int, count: int) -> dict[str, NDArray[Any]]:
-        """Return the drawn values, by column, each (count,), of the runs from `first` on. InputError where a key refuses
+        """Return the values, (count,) by column, drawn for `count` runs from `first` on. InputError where a key refuses
         one."""
         return self.values(self.unit(first, count))
 
     def values(self, unit: Array) -> dict[str, NDArray[Any]]:
-        """Return the values by column, each (n,), for uniforms (dims, n). InputError where a key refuses one."""
+        """Return the values, (n,) by column, for uniforms (dims, n). InputError where a key refuses one."""
         columns: dict[str, NDArray[Any]] = {}
         for dispersion, numbers in self._each(unit):
             columns |= dict(zip(dispersion.columns, dispersion.draw(numbers), strict=True))
         return columns
 
     def possible(self, unit: Array) -> NDArray[np.bool_]:
-        """Return for which of the uniforms (dims, n) every key accepts its value, judged by its bounds."""
+        """Return a mask (n,) of the uniforms (dims, n) whose values are within the bounds of all keys."""
         return np.logical_and.reduce([dispersion.possible(numbers) for dispersion, numbers in self._each(unit)])
 
     def _each(self, unit: Array) -> Iterator[tuple[Dispersion, Array]]:
@@ -144,7 +145,7 @@ class Plan:
             begun += dispersion.dims
 
     def change(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the change with which `Scenario.with_` makes the scenario of one run, from its values by column."""
+        """Return the argument of `Scenario.with_` for the scenario of one run with these values by column."""
         nominal = {name: table for one in self.dispersions for name, table in one.nominal_tables.items()}
         changes: dict[str, Any] = {f"nominal.{name}": table for name, table in nominal.items()}
         for dispersion in self.dispersions:
@@ -156,7 +157,8 @@ class Plan:
 
 
 def _random(key: int, dims: int, first: int, count: int) -> Array:
-    """Return uniforms (dims, count) of a generator, a function of its key and a counter; each run has its own counts."""
+    """Return uniforms (dims, count) from a generator that is a function of its key and a counter; each run has its own
+    counter values."""
     # Philox gives four numbers for each value of its counter.
     each = -(-dims // 4)
     raw = np.random.Philox(key=key, counter=first * each).random_raw(count * each * 4).reshape(count, each * 4)
@@ -174,19 +176,19 @@ def _sobol(dims: int, seed: int, first: int, count: int) -> Array:
     # Untyped, because newer versions have `seed` only at run time, and older ones only that.
     make: Any = qmc.Sobol
     sequence = make(dims, scramble=True, seed=_generator(seed))
-    # The first point is drawn alone: the library warns unless the first draw is a power of 2, but the caller chooses the
-    # cuts.
+    # The first point is drawn alone: the library warns unless the first draw is a power of 2, but the caller chooses where
+    # to split.
     head = sequence.random(1)
     if first > 1:
         sequence.fast_forward(first - 1)
     rest = sequence.random(count - 1 if first == 0 else count)
-    # To the middle of the interval that a point of 30 bits represents.
+    # Moved to the middle of the interval that a point of 30 bits represents.
     return (np.vstack([head, rest]) if first == 0 else rest) + 2.0**-31
 
 
 @lru_cache(maxsize=1)
 def _latin_hypercube(keys: tuple[tuple[int, int], ...], runs: int) -> Array:
-    """The whole sample (runs, dims): for each dispersion a key and its uniforms."""
+    """Return the whole sample (runs, dims); keys: for each dispersion its key and its number of uniforms."""
     from scipy.stats import qmc
 
     make: Any = qmc.LatinHypercube
@@ -195,7 +197,7 @@ def _latin_hypercube(keys: tuple[tuple[int, int], ...], runs: int) -> Array:
 
 @lru_cache(maxsize=1)
 def _design(sampling: str, dims: int, seed: int, size: int) -> Array:
-    """The whole design (runs, dims) of a number of trajectories, or of base points."""
+    """Return the whole design (runs, dims); size: the number of trajectories (Morris) or of base points (Saltelli)."""
     if sampling == "saltelli":
         return saltelli_design(dims, size, _generator(seed))
     problem = {"num_vars": dims, "names": [str(n) for n in range(dims)], "bounds": [[0.0, 1.0]] * dims}

@@ -1,13 +1,13 @@
-"""Morris's screening and Sobol's indices measure how much each input changes a metric, from campaigns sampled for that.
+"""Morris's screening and Sobol's indices measure how much each input changes a metric, in campaigns sampled for them.
 
-Both need designs of their own, which `sampling` lays out in the unit cube: "morris" one step of one input at a time (M. D.
-Morris, Technometrics 33, 1991; mu* of F. Campolongo et al., Environ. Model. Softw. 22, 2007), "saltelli" two samples and
-their crossings (A. Saltelli et al., Comput. Phys. Commun. 181, 2010), each taken both ways. A failed run leaves a gap: a
-Morris design loses only its trajectory; Sobol's estimators fail, and any filled-in value would be invented.
+Both need special designs, which `sampling` lays out in the unit cube: "morris" changes one input per step (M. D. Morris,
+Technometrics 33, 1991; mu* of F. Campolongo et al., Environ. Model. Softw. 22, 2007), "saltelli" has two samples and their
+crossings (A. Saltelli et al., Comput. Phys. Commun. 181, 2010), in both directions. A failed run leaves a gap: a Morris
+design loses only one trajectory, but Sobol's estimators fail, because a filled-in value would be arbitrary.
 
 Points of one Sobol sequence are far from independent: indices from them are much better than a bootstrap over the points
-suggests. So a design consists of `SCRAMBLINGS` sequences that are scrambled independently, and how the indices change when
-one of them is left out gives the half-widths (the jackknife over groups; A. B. Owen, Monte Carlo theory, 2013, chapter 17).
+suggests. Therefore a design consists of `SCRAMBLINGS` independently scrambled sequences, and the changes of the indices when
+one of them is left out give the half-widths (the jackknife over groups; A. B. Owen, Monte Carlo theory, 2013, chapter 17).
 """
 
 import math
@@ -21,8 +21,8 @@ from scipy import special
 
 Array: TypeAlias = NDArray[np.float64]
 SCRAMBLINGS = 8
-"""The number of Sobol sequences of a Saltelli design; one for each point where there are fewer points."""
-NO_SALTELLI = "the runs are no Saltelli design of two samples and their crossings"
+"""The number of Sobol sequences in a Saltelli design; one per point where there are fewer points."""
+NO_SALTELLI = "the runs are not a Saltelli design of two samples and their crossings"
 STEP_ERROR = 0.05
 """The share by which a step of a Morris design may differ from the grid's, because ends of the unit interval may be moved
 inward."""
@@ -37,10 +37,10 @@ class Refused:
 
 @dataclass(frozen=True)
 class Morris:
-    """Elementary effects of each input, in the metric's unit for its range, from the lowest to the highest level of the
-    design (an eighth and seven eighths of the probability, see `sampling.LEVELS`): the mean `mu`, the mean
-    magnitude `mu_star` with the half-width of its interval of `confidence`, and the standard deviation `sigma`, which is
-    not small against mu_star where an input acts unevenly or together with others. All (inputs,).
+    """Elementary effects of each input, in the metric's unit per range of the input from the lowest to the highest level of
+    the design (the quantiles 1/8 and 7/8, see `sampling.LEVELS`): the mean `mu`, the mean magnitude `mu_star` with the
+    half-width of its confidence interval, and the standard deviation `sigma`, which is not small compared with mu_star where
+    an input acts nonlinearly or together with others. All (inputs,).
 
     Of the `trajectories` flown, `dropped` had a run without a value."""
 
@@ -56,8 +56,8 @@ class Morris:
 
 @dataclass(frozen=True)
 class Sobol:
-    """Shares of a metric's variance that each input makes by itself (`first`) and with all others (`total`), with the
-    half-widths of their intervals of `confidence`; all (inputs,)."""
+    """The shares of a metric's variance that each input causes alone (`first`) and with all others (`total`), with the
+    half-widths of their confidence intervals; all (inputs,)."""
 
     names: tuple[str, ...]
     first: Array
@@ -68,11 +68,11 @@ class Sobol:
 
 
 def morris(names: Sequence[str], unit: Array, values: Array, confidence: float = 0.95) -> Morris | Refused:
-    """Compute elementary effects from points of the unit cube (runs, inputs) and the metric's values (runs,), NaN where a
+    """Return the elementary effects from points of the unit cube (runs, inputs) and the metric's values (runs,), NaN where a
     run has none; runs in the order of the design."""
     unit, values, size = np.asarray(unit, float), np.asarray(values, float), len(names) + 1
     if not names or unit.shape != (len(values), len(names)) or not len(values) or len(values) % size:
-        return Refused(f"{len(values)} runs are no whole number of trajectories of {size} runs")
+        return Refused(f"{len(values)} runs are not a whole number of trajectories of {size} runs")
     steps = np.diff(unit.reshape(-1, size, len(names)), axis=1)
     step = float(np.abs(steps).max())
     moved = np.abs(steps) > 0.5 * step
@@ -81,7 +81,7 @@ def morris(names: Sequence[str], unit: Array, values: Array, confidence: float =
     grid = levels / (2.0 * (levels - 1))
     one_each = bool((moved.sum(1) == 1).all() and (moved.sum(2) == 1).all())
     if not (step > 0.5 and one_each and np.abs(np.abs(steps) - grid * moved).max() <= STEP_ERROR * grid):
-        return Refused("the runs are no Morris design, in which each step is of one input and each input takes one step")
+        return Refused("the runs are not a Morris design, in which each step changes one input and each input changes once")
     there = np.isfinite(values.reshape(-1, size)).all(axis=1)
     flown, kept = there.size, int(there.sum())
     if kept < 2:
@@ -96,10 +96,10 @@ def morris(names: Sequence[str], unit: Array, values: Array, confidence: float =
 
 
 def saltelli_design(dims: int, size: int, generator: np.random.Generator) -> Array:
-    """Place `size` pairs of points, a power of 2, and the crossings of each pair: (size (2 dims + 2), dims)."""
+    """Return `size` pairs of points, a power of 2, with the crossings of each pair, (size (2 dims + 2), dims)."""
     from scipy.stats import qmc
 
-    # Untyped, for newer versions know `seed` only at run time, and older ones nothing else.
+    # Untyped, because newer versions accept `seed` only at run time, and older ones nothing else.
     make: Any = qmc.Sobol
     groups = min(size, SCRAMBLINGS)
     pairs = np.vstack([make(2 * dims, scramble=True, seed=generator).random(size // groups) for _ in range(groups)])
@@ -107,7 +107,7 @@ def saltelli_design(dims: int, size: int, generator: np.random.Generator) -> Arr
 
 
 def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 0.95) -> Sobol | Refused:
-    """Compute Sobol's indices from points of `saltelli_design` (runs, inputs) and the metric's values (runs,), NaN where a
+    """Return Sobol's indices from points of `saltelli_design` (runs, inputs) and the metric's values (runs,), NaN where a
     run has none; runs in the order of the design."""
     unit, values, count = np.asarray(unit, float), np.asarray(values, float), len(names)
     if not count or unit.shape != (len(values), count) or not _crossed(unit):
@@ -134,7 +134,7 @@ def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 
 
 
 def _estimates(blocks: Array) -> tuple[Array, Array]:
-    """Estimate the indices (inputs,) of first order and in total from blocks (points, 2 inputs + 2) of values: the means of
+    """Return the first-order and total indices, both (inputs,), from blocks (points, 2 inputs + 2) of values: the means of
     the estimators of Saltelli (2010) and of Jansen (Comput. Phys. Commun. 117, 1999) over both ways to cross two points."""
     count = blocks.shape[1] // 2 - 1
     ends = blocks[:, [0, -1]]
@@ -148,8 +148,8 @@ def _estimates(blocks: Array) -> tuple[Array, Array]:
 
 
 def _crossed(unit: Array) -> bool:
-    """Return whether runs are blocks of a point, the point with each coordinate in turn from another, the reverse, and the
-    other."""
+    """Return whether the runs form blocks of: one point, this point with each coordinate in turn from a second point, the
+    second point with each coordinate from the first, and the second point."""
     count = unit.shape[1]
     if not len(unit) or len(unit) % (2 * count + 2):
         return False
@@ -158,6 +158,6 @@ def _crossed(unit: Array) -> bool:
 
 
 def _cross(one: Array, other: Array) -> Array:
-    """Cross pairs of points, each (pairs, 1, inputs): blocks (pairs, 2 inputs + 2, inputs)."""
+    """Return the blocks (pairs, 2 inputs + 2, inputs) of crossed pairs of points, each (pairs, 1, inputs)."""
     swap = np.eye(one.shape[2], dtype=bool)
     return np.concatenate([one, np.where(swap, other, one), np.where(swap, one, other), other], axis=1)

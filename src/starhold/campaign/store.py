@@ -4,7 +4,7 @@
     runs/LAW/000000000-000016383.0123456789abcdef.parquet    one chunk
     campaign.json                                            digest and totals, once all is flown
 
-Files appear under their names only when they are complete and on the disk, so a folder is sound at any instant.
+Files get their names only when they are complete and on the disk, so a folder is valid at any instant.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from starhold.files import atomic_write, claim, clear_unfinished, read_text
 
 RUNS, TOTALS = "runs", "campaign.json"
 MARKS = (manifests.FILE, TOTALS, RUNS)
-"""A folder with one of these holds a campaign."""
+"""Files and folders of which each marks the folder of a campaign."""
 BESIDE = ("worst-*.toml", "recorded/*.nc", "report.html")
-"""Files with results that are written beside it."""
+"""Further files of results in the folder."""
 _MOST_BYTES = 2**25
-"""Bytes of columns, 8 a number, that are read at once where all are needed, because each read opens all files again."""
+"""Bytes of columns (8 per number) that are read at once where all columns are needed: each read opens all files again."""
 _NAME = re.compile(r"(\d{9,})-(\d{9,})\.([0-9a-f]{16})\.parquet")
 
 
@@ -60,8 +60,8 @@ class Store:
 
     @classmethod
     def create(cls, folder: Path, manifest: Manifest, force: bool = False) -> Store:
-        """Create a campaign in a folder, which is made. InputError where it holds one already, unless `force`, which removes
-        that one; where it cannot be written; and where another process writes."""
+        """Create a campaign in a folder, which is made if absent. InputError where it holds a campaign already, which
+        `force` removes instead; where it cannot be written; and while another process writes there."""
         extra("pyarrow")
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -94,15 +94,15 @@ class Store:
         return cls(folder, Manifest.from_json(text, str(path)))
 
     def resume(self, manifest: Manifest) -> Store:
-        """Open this campaign for more runs, with the new manifest's numbers of runs and of runs in a chunk. InputError with
-        the first difference where the new manifest would give other results or fewer runs, and where another process writes
-        into the folder.
+        """Return this campaign opened for more runs, with the numbers of runs and of runs per chunk of the new manifest.
+        InputError with the first difference where the new manifest would change results or has fewer runs, and while another
+        process writes into the folder.
         """
         try:
             _claim(self.folder)
         except OSError as error:
             raise InputError(str(self.folder), "", "", f"cannot be written: {error.strerror}") from None
-        # Read again: until the claim, another process may have written.
+        # Read again: another process may have written before this one claimed the folder.
         old = Store.open(self.folder).manifest
         if difference := manifest.difference(old):
             raise InputError(
@@ -120,10 +120,10 @@ class Store:
         return self
 
     def files(self, law: str) -> list[ChunkFile]:
-        """Return the sound chunks of a law in the order of their runs.
+        """Return the usable chunks of a law in the order of their runs.
 
-        The first call reads all of them, to compare their bytes with their hashes, and adds a line to `notices` for each
-        that is unusable; a store that writes removes those."""
+        The first call compares the bytes of all chunks with their hashes and adds a line to `notices` for each unusable one,
+        which a store open for writing removes."""
         if law not in self._files:
             kept: list[ChunkFile] = []
             for file in sorted(self._listed(law), key=lambda file: (file.first, file.last)):
@@ -135,12 +135,13 @@ class Store:
         return self._files[law]
 
     def missing(self, law: str) -> list[tuple[int, int]]:
-        """Return first number and count of the blocks of a law's runs still to be flown, none longer than a chunk."""
+        """Return the first run and the number of runs of each block still to be flown for a law, none longer than a
+        chunk."""
         blocks: list[tuple[int, int]] = []
         start, size, runs = 0, self.manifest.chunk, self.manifest.runs
         for first, last in [*((file.first, file.last) for file in self.files(law)), (runs, runs)]:
             while start < min(first, runs):
-                # Cut at multiples of the chunk size, so that a repaired campaign has the same files as any other.
+                # Split at multiples of the chunk size, so that a repaired campaign has the same files as any other.
                 end = min(start - start % size + size, first, runs)
                 blocks.append((start, end - start))
                 start = end
@@ -148,8 +149,8 @@ class Store:
         return blocks
 
     def put(self, chunk: Chunk) -> None:
-        """Write a chunk so that it survives a crash from here on. InputError where the disk is full or fails. ValueError
-        where its law, its runs or its columns are not those of the campaign.
+        """Write a chunk; after the return it survives a crash. InputError where the disk is full or fails. ValueError where
+        its law, runs or columns do not belong to the campaign.
         """
         if not self._writing:
             raise ValueError("this store is open for reading only")
@@ -162,7 +163,7 @@ class Store:
             # Totals without this chunk would be wrong.
             (self.folder / TOTALS).unlink(missing_ok=True)
             folder.mkdir(parents=True, exist_ok=True)
-            # The names first, so that no chunk is stored whose columns are not in the manifest.
+            # The manifest first, so that no chunk is stored whose columns are not in it.
             if chunk.law not in self.manifest.columns:
                 self.manifest = replace(self.manifest, columns={**self.manifest.columns, chunk.law: tuple(chunk.rows)})
                 self._write_manifest()
@@ -177,9 +178,9 @@ class Store:
             kept.sort(key=lambda file: file.first)
 
     def columns(self, names: Sequence[str], law: str) -> dict[str, NDArray[Any]]:
-        """Columns by name, one element for each stored run in the order of runs.
+        """Return columns by name, with one element per stored run, in the order of runs.
 
-        Holds these columns and one chunk of them in memory. InputError where the law has no such column."""
+        These columns and one chunk of them are in memory at once. InputError where the law has no such column."""
         self._check_known(names, law)
         files = self.files(law)
         whole: dict[str, NDArray[Any]] = {}
@@ -203,7 +204,7 @@ class Store:
                 yield columns.pop(name)
 
     def row(self, law: str, run: int) -> dict[str, Any]:
-        """Return one run's values by column; InputError where this run of the law is not stored."""
+        """Return the values of one run by column. InputError where this run of the law is not stored."""
         for file in self.files(law):
             if file.first <= run <= file.last:
                 stored = parquet.read(file.path, list(parquet.names(file.path)))
@@ -211,12 +212,12 @@ class Store:
         raise InputError(str(self.folder), "", f"no run {run} of {law}", f"0 to {self.manifest.runs - 1}, once flown")
 
     def envelopes(self, law: str) -> tuple[Counts, Extremes]:
-        """Merge the counts and the extremes of all stored runs of a law."""
+        """Return the merged counts and extremes of all stored runs of a law."""
         return merge(parquet.added_up(file.path) for file in self.files(law))
 
     def finish(self, digest: str, totals: Mapping[str, Any]) -> Path:
-        """Write `campaign.json`: the digest (see `campaign.digest`), how many runs of each law are stored, and the
-        totals as JSON. Returns its path."""
+        """Write `campaign.json` with the digest (see `campaign.digest`), the number of stored runs of each law, and the
+        totals; return its path."""
         runs = {law: sum(file.last - file.first + 1 for file in self.files(law)) for law in self.manifest.laws}
         content = {"digest": digest, "fingerprint": self._fingerprint, "runs": runs, **totals}
         path = self.folder / TOTALS
@@ -224,13 +225,13 @@ class Store:
         return path
 
     def _listed(self, law: str) -> list[ChunkFile]:
-        """Files that are named as chunks are."""
+        """Return the files whose names are those of chunks."""
         place = self.folder / RUNS / law
         matches = [(path, _NAME.fullmatch(path.name)) for path in (place.iterdir() if place.is_dir() else ())]
         return [ChunkFile(path, int(match[1]), int(match[2])) for path, match in matches if match]
 
     def _fault(self, file: ChunkFile, law: str, kept: list[ChunkFile]) -> str:
-        """Return why a chunk is unusable, or ""."""
+        """Return the reason why a chunk is unusable, or ""."""
         try:
             with file.path.open("rb") as source:
                 digest = hashlib.file_digest(source, "sha256").hexdigest()[:16]
@@ -281,7 +282,7 @@ _KEPT = "; what was computed is kept, --resume continues from there"
 
 
 def _claim(folder: Path) -> None:
-    """Become the only process that writes there, and remove half-written files of killed ones. OSError where that fails."""
+    """Lock the folder for writing by this process, and remove incomplete files of killed processes. OSError on failure."""
     try:
         claim(folder)
     except BlockingIOError:
@@ -291,7 +292,7 @@ def _claim(folder: Path) -> None:
 
 
 def _clear(folder: Path) -> None:
-    """Remove a campaign and nothing else, the manifest last: until then, its remains can be recognized."""
+    """Remove a campaign and nothing else; the manifest comes last, so that remains of the campaign can be recognized."""
     (folder / TOTALS).unlink(missing_ok=True)
     for pattern in BESIDE:
         for path in folder.glob(pattern):
@@ -306,7 +307,7 @@ def _clear(folder: Path) -> None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Write a file that is complete and on the disk from the instant it has its name."""
+    """Write a file that gets its name only once it is complete and on the disk."""
     with atomic_write(path) as hidden, hidden.open("wb") as sink:
         sink.write(data)
         sink.flush()
@@ -315,7 +316,7 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Flush a folder's directory entry to the disk, where the system can do that."""
+    """Flush a folder's directory entry to the disk, where the system supports it."""
     if os.name != "posix":
         return
     handle = os.open(folder, os.O_RDONLY)

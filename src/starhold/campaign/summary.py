@@ -1,4 +1,4 @@
-"""Summarizes the stored runs of a campaign, column by column, because many runs do not fit into memory."""
+"""Summarizes the stored runs of a campaign column by column, because many runs do not fit into memory."""
 
 import math
 import shlex
@@ -23,20 +23,20 @@ from starhold.studies.requirements import Requirement
 BARS, WIDE = 60, 100.0
 """The most bars of a histogram; and the ratio of largest to least value above which a metric has a logarithmic scale."""
 MOST_DRIVEN = 200_000
-"""Runs, from the first on, among which drivers are sought."""
+"""The number of runs, from the first on, in which drivers are sought."""
 KINDS: Mapping[str, Any] = {"morris": sensitivity.morris, "saltelli": sensitivity.sobol}
-"""The functions that compute sensitivity indices, by the samplings designed for them."""
+"""The functions that compute sensitivity indices, by sampling."""
 FAILURES = 3
 """The number of failed runs worth flying again, in addition to the worst of each requirement."""
 
 
 def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool = False) -> tuple[LawResult, ...]:
-    """Sum up the stored runs of each law."""
+    """Return the results of each law, from its stored runs."""
     spreads: dict[str, dict[str, Spread]] = {law: {} for law in laws}
     units = {name: unit for law in laws for name, unit in job.meter(law).units.items()}
     columns = {law: store.each_column([name for name in units if name in job.meter(law).units], law) for law in laws}
     for name, unit in units.items():
-        # All laws at once, for histograms side by side.
+        # All laws at once, so that their histograms have the same bins.
         by_law = {law: next(columns[law]) for law in laws if name in job.meter(law).units}
         for law, spread in zip(by_law, spreads_of(name, unit, list(by_law.values())), strict=True):
             spreads[law][name] = spread
@@ -63,9 +63,9 @@ def _summary(store: Store, job: Job, law: str, spreads: Mapping[str, Spread], un
 
 
 def spreads_of(name: str, unit: str, values: Sequence[NDArray[np.float64]]) -> list[Spread]:
-    """The distributions of a metric of some laws, with the same bins."""
+    """Return the distributions of a metric for several laws, with the same bins; values: (runs,) for each law."""
     there = [column[~np.isnan(column)] for column in values]
-    # About as many bars as runs in each.
+    # The number of bars is about the number of runs in each.
     edges = _edges(np.concatenate(there), min(BARS, math.isqrt(max(map(len, there)) or 1)))
     return [_spread(name, unit, finite, len(column), edges) for finite, column in zip(there, values, strict=True)]
 
@@ -78,8 +78,8 @@ def _spread(name: str, unit: str, there: NDArray[np.float64], runs: int, edges: 
 
 
 def _edges(values: NDArray[np.float64], bars: int) -> NDArray[np.float64]:
-    """Return the edges of the bins, equal on a logarithmic scale where the values span decades; a single bin about a value
-    that all share. Outliers are counted in the end bins, so that they do not squeeze the others."""
+    """Return the edges of the bins, equally spaced, on a logarithmic scale where the values span decades; a single bin where
+    all values are equal. Outliers are counted in the end bins, so that they do not compress the rest."""
     if not len(values):
         return np.zeros(0)
     least, low, high, most = np.quantile(values, [0.0, 0.005, 0.995, 1.0]).tolist()
@@ -101,7 +101,7 @@ def _envelopes(store: Store, meter: Meter, law: str) -> Any:
 
 
 def verdicts_of(store: Store, job: Job, law: str, until_decided: bool, runs: int | None = None) -> tuple[Verdict, ...]:
-    """The verdicts on a law's requirements by its stored runs, or by the first ones."""
+    """Return the verdicts on a law's requirements from its stored runs, or from the first `runs` of them."""
     return tuple(_verdict(store, job, law, requirement, until_decided, runs) for requirement in job.requirements(law))
 
 
@@ -122,7 +122,7 @@ def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_d
 
 
 def _knowledge(job: Job, law: str) -> str:
-    """State which drawn values the law knows; empty where it never knows any number of its craft."""
+    """Return a sentence on which drawn values the law knows; "" where laws never know any number of the craft."""
     clauses: dict[str, list[str]] = {"assumes the file's value of": [], "knows each drawn value of": []}
     clauses |= {"learns at the diagnosis each drawn value of": [], "never learns the drawn value of": []}
     supposed, known, learnt, missed = clauses.values()
@@ -142,7 +142,7 @@ def _drivers(
 ) -> Drivers | None:
     names = [name for dispersion in job.dispersions for name in dispersion.columns]
     if not names or job.table.sampling in KINDS:
-        # Runs of those designs repeat one another's values, so tests on them are not valid.
+        # Runs of these designs share values with one another, so tests on them are not valid.
         return None
     inputs = {name: values[:MOST_DRIVEN] for name, values in store.columns(names, law).items()}
     inputs |= _sizes(job, inputs)
@@ -152,7 +152,8 @@ def _drivers(
 
 
 def _sizes(job: Job, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float64]]:
-    """Return the angle of an attitude and the norm of a vector in any direction, which may matter more than components."""
+    """Return the angles (runs,) of drawn attitudes and the norms of vectors in any direction, by name: these may explain
+    failures better than components do."""
     sizes: dict[str, NDArray[np.float64]] = {}
     for dispersion in job.dispersions:
         if size := dispersion.distribution.size([inputs[name] for name in dispersion.columns]):
@@ -188,7 +189,7 @@ def _indices(store: Store, job: Job, law: str, requirements: tuple[Requirement, 
 
 
 def _again(folder: Path, law: str, verdicts: tuple[Verdict, ...], failed: NDArray[np.bool_], seed: int) -> tuple[Again, ...]:
-    """List the worst run of each requirement, the first ones that failed, and one for comparison."""
+    """Return the worst run of each requirement, the first failed runs, and one run picked at random."""
     why: dict[int, list[str]] = {}
     for verdict in verdicts:
         why.setdefault(verdict.worst_run, []).append(f"worst {verdict.name}")

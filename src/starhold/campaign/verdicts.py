@@ -1,11 +1,11 @@
-"""Decides whether a campaign shows that the required share of flights keeps a requirement.
+"""Decides whether a campaign shows that the required share of flights meets a requirement.
 
-A number of runs that is fixed beforehand is judged by the binomial law: exact bounds of the failure probability (C. J.
+A number of runs fixed beforehand is judged by the binomial distribution: exact bounds on the failure probability (C. J.
 Clopper, E. S. Pearson, Biometrika 26, 1934) and, equivalently, the greatest number of failures with which the requirement is
 accepted at a consumer's risk of at most 1 - confidence (J. M. Hanson, B. B. Beard, "Applying Monte Carlo Simulation to
 Launch Vehicle Design and Requirements Verification", NASA/TP-2010-216447). A campaign that stops early is judged by
-`sequence` instead. A requirement is kept where its margin is 0 or more. A margin of NaN or minus infinity, as of a lost run,
-is a miss and worse than any other.
+`sequence` instead. A run meets a requirement if its margin is 0 or more. A margin of NaN or minus infinity, as of a lost
+run, is a miss and worse than any other.
 """
 
 import math
@@ -23,13 +23,13 @@ from starhold.errors import InputError
 
 SEVERITY: tuple[Outcome, ...] = ("met", "not decided", "missed")
 PARTS = 4
-"""Known inputs with more values than this are cut into this many parts with about equal numbers of runs."""
+"""Known inputs with more values than this are divided into this many parts with about equal numbers of runs."""
 
 
 def failure_bounds(failures: int, runs: int, confidence: float, sides: int = 2) -> Bounds:
-    """Bound a failure probability from the failures among a fixed number of independent runs (Clopper-Pearson, exact).
+    """Return the exact Clopper-Pearson bounds on a failure probability from a fixed number of independent runs.
 
-    With two `sides` both bounds together hold with the confidence; with one each bound holds with it by itself."""
+    With two `sides` both bounds hold together with the confidence; with one, each bound holds with it separately."""
     require_share("confidence", confidence)
     require_counts(failures, runs)
     tail = (1.0 - confidence) / sides
@@ -39,7 +39,7 @@ def failure_bounds(failures: int, runs: int, confidence: float, sides: int = 2) 
 
 
 def acceptance(share: float, runs: int, failures: int) -> float:
-    """Return the probability that at most `failures` of the runs fail, if flights keep the requirement with probability
+    """Return the probability that at most `failures` of the runs fail if flights meet the requirement with probability
     `share`."""
     require_share("share", share)
     require_counts(failures, runs)
@@ -57,19 +57,19 @@ def runs_needed(share: float, risk: float, failures: int) -> int:
 
 
 def allowed_failures(share: float, risk: float, runs: int) -> int | None:
-    """Return the greatest number of failures that is accepted at a consumer's risk of at most `risk`; None: too few runs
-    for any."""
+    """Return the greatest number of failures accepted at a consumer's risk of at most `risk`; None where there are too few
+    runs to accept any."""
     require_share("share", share)
     require_share("risk", risk)
     return sequence.greatest(lambda failures: acceptance(share, runs, failures) <= risk, runs)
 
 
 def quantile_bound(values: ArrayLike, share: float, confidence: float) -> float | None:
-    """Return a value that at least `share` of all flights reach or exceed, with the confidence; None where runs are too few.
+    """Return a value that at least `share` of all flights reach or exceed, with the confidence; None for too few runs.
 
-    It is an order statistic of the values (n,), valid for any distribution: the one just above the values that may fail by
-    `allowed_failures`. Less is worse; NaN is worst and counts as minus infinity. Pass the negative of a metric if more is
-    worse. A fixed number of runs meets a requirement exactly where this bound of its margin is 0 or more."""
+    It is an order statistic of the values (n,), valid for any distribution: the least value after leaving out the
+    `allowed_failures` worst. Less is worse; NaN counts as minus infinity. Pass the negative of a metric if more is worse. A
+    fixed number of runs meets a requirement exactly if this bound on its margin is 0 or more."""
     values = _worst_first(values)
     allowed = allowed_failures(share, 1.0 - confidence, len(values))
     return None if allowed is None else float(np.partition(values, allowed)[allowed])
@@ -77,10 +77,10 @@ def quantile_bound(values: ArrayLike, share: float, confidence: float) -> float 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the runs, of one condition that is known before flight, judged by itself. `lower` and `upper` bound the
-    failure probability, each by itself with the confidence: Clopper-Pearson's bounds, or those of `sequence` for a
-    sequential campaign; None where the draws are not independent. `more` runs without another failure would make the outcome
-    "met" (None: impossible or unknown)."""
+    """The verdict on a part of the runs, those under one condition known before flight. `lower` and `upper` bound the
+    failure probability, each with the confidence: Clopper-Pearson's bounds, or those of `sequence` for a sequential
+    campaign; None where the draws are not independent. `more` further runs without a failure would make the outcome "met"
+    (None: impossible or unknown)."""
 
     name: str
     runs: int
@@ -92,17 +92,17 @@ class Part:
 
     @property
     def observed(self) -> float:
-        """Return the share of the runs that kept the requirement."""
+        """The share of the runs that met the requirement."""
         return 1.0 - self.failures / self.runs
 
 
 @dataclass(frozen=True)
 class Verdict(Part):
-    """A campaign's answer whether a requirement is kept by at least `share` of all flights, with `confidence`.
+    """A campaign's verdict whether at least `share` of all flights meet a requirement, with `confidence`.
 
-    `allowed` failures are accepted with these runs (None: none are, there are too few runs); `more` is about, where there
-    are parts, as the runs that fall in a part are not chosen. The run numbered `worst_run` has the `worst_margin`;
-    `margin_bound` is a margin that at least `share` of all flights keep, with the confidence, by order statistics (None: too
+    `allowed` failures are accepted with this number of runs (None: too few runs to accept any). With parts, `more` is
+    approximate, because one cannot choose the runs that fall in a part. The run `worst_run` has the margin `worst_margin`;
+    `margin_bound` is a margin that at least `share` of all flights have, with the confidence, by order statistics (None: too
     few runs, or their number was not fixed). `parts` are the conditions known before flight, `worst_part` the one with the
     strongest evidence against the requirement."""
 
@@ -117,11 +117,11 @@ class Verdict(Part):
     independent: bool
     until_decided: bool
     knowledge: str = ""
-    """A sentence that states what laws know about the draws."""
+    """A sentence on which drawn values laws know."""
 
     def sentence(self) -> str:
-        """State the verdict and its basis."""
-        flown = f"{self.failures} of {self.runs} runs miss it ({percent(self.observed)} keep it, {percent(self.share)} must)"
+        """Return the verdict and its basis in words."""
+        flown = f"{self.failures} of {self.runs} runs miss it ({percent(self.observed)} meet it, {percent(self.share)} must)"
         if self.lower is None or self.upper is None:
             text = f"{self.name}: {flown}. The draws are not independent of each other, so no confidence can be given"
             return f"{text}; random sampling gives one. {self.knowledge}".rstrip()
@@ -154,19 +154,20 @@ def judge(
     run: NDArray[np.int64] | None = None,
     knowledge: str = "",
 ) -> Verdict:
-    """Judge a requirement by its margins (n,), n > 0, of the runs numbered `run` (n,), or else 0 to n - 1.
+    """Return the verdict on a requirement by its margins (n,), n > 0, in the runs numbered `run` (n,), by default 0 to n -
+    1.
 
-    What is known before flight must not be averaged over: a launch on a bad day has a bad day's failure probability. So each
-    column (n,) of `known` is cut into its quarters, or its values if they are words or no more than four numbers, and each
-    such part is judged by itself with the same share and confidence. The outcome is "met" only if the runs together and each
-    of the parts are. No correction for the number of parts is needed: if any condition misses its share, its own test must
-    fail to show it (the risk of an intersection-union test is that of its tests; R. L. Berger, Technometrics 24, 1982). The
-    reverse does: for "missed" the parts share one risk 1 - `confidence` evenly (Bonferroni), beside that of the runs
-    together. Conditions are judged one at a time, not in combination.
+    Conditions known before flight must not be averaged over: a launch on a bad day has a bad day's failure probability. So
+    each column (n,) of `known` is divided into quarters, or into its values if they are words or at most four numbers, and
+    each part is judged separately with the same share and confidence. The outcome is "met" only if it is so for all runs
+    together and for each part. No correction for the number of parts is needed: a wrong "met" requires that the test of a
+    condition that misses its share errs (the risk of an intersection-union test is that of its tests; R. L. Berger,
+    Technometrics 24, 1982). For "missed" one is needed: the parts share one risk 1 - `confidence` evenly (Bonferroni),
+    beside that of the runs together. Conditions are judged one at a time, not in combination.
 
-    `independent` says whether runs are drawn independently; with Sobol' points or a Latin hypercube the binomial law does
-    not hold, and only the observed share is returned. `until_decided` says that the number of runs was not fixed beforehand;
-    the verdict then uses `sequence` and may be taken any number of times."""
+    independent: whether runs are drawn independently; for Sobol points or a Latin hypercube the binomial distribution does
+    not apply, and only the observed share is returned. until_decided: whether the number of runs was not fixed beforehand;
+    then the verdict uses `sequence` and may be taken any number of times."""
     require_share("share", share)
     require_share("confidence", confidence)
     margins = _worst_first(margins)
@@ -212,7 +213,7 @@ def _judge(
     until_decided: bool,
     missed_confidence: float,
 ) -> Part:
-    """Judge runs of one condition; "missed" has its own confidence."""
+    """Return the verdict on the runs of one condition; "missed" has its own confidence."""
     runs, failures = len(missed), int(missed.sum())
     if not independent:
         return Part(name, runs, failures, None, None, "not decided", None)
@@ -231,7 +232,7 @@ def _judge(
 
 
 def _parts(known: Mapping[str, NDArray]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    """Return the names of the conditions known before flight, with the runs (n,) of each; a constant is no condition."""
+    """Yield the names of the conditions known before flight, each with a mask (n,) of its runs; constants are left out."""
     for name, column in known.items():
         column = np.asarray(column)
         values = np.unique(column)
@@ -257,7 +258,7 @@ def _badness(part: Part) -> tuple[int, float, float]:
 
 
 def _worst_first(values: ArrayLike) -> NDArray[np.float64]:
-    """Return values (n,) with minus infinity, the worst value, for NaN."""
+    """Return values (n,) with NaN replaced by minus infinity, the worst value."""
     values = np.asarray(values, dtype=np.float64)
     return np.where(np.isnan(values), -np.inf, values)
 
@@ -267,6 +268,6 @@ def _shown(value: object) -> str:
 
 
 def percent(share: float) -> str:
-    """Show a share with enough digits to tell it from 0 and 100 %."""
+    """Return a share in percent, with enough digits to distinguish it from 0 and 100 %."""
     digits = 3 if not 0.0 < share < 1.0 else max(3, 1 - math.floor(math.log10(min(share, 1.0 - share) * 100.0)))
     return f"{100.0 * share:.{digits}f}".rstrip("0").rstrip(".") + " %"

@@ -1,5 +1,5 @@
-"""Decides whether a law keeps the requirements of its scenario; each method runs at most once, and only if a requirement
-needs it. A review uses the same flights."""
+"""Decides whether a law meets the requirements of its scenario. Each method runs at most once, and only if a requirement
+needs it; a review uses the same flights."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ if TYPE_CHECKING:
 Notice = Callable[[int, int, str], None]
 SILENT: Notice = lambda done, total, what: None  # noqa: E731
 Known = TypeVar("Known")
-OTHER_BODY = "it is known of attitudes alone"
+OTHER_BODY = "it is available for rigid bodies only"
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """All evidence about a law of a scenario, each piece computed at its first use. Where there is none, a text gives the
+    """All evidence about a law of a scenario, computed at first use. Missing evidence is replaced by a text with the
     reason."""
 
     scenario: Scenario
@@ -69,21 +69,21 @@ class Evidence:
 
     @cached_property
     def flight(self) -> Flight:
-        """One flight of the scenario as it stands."""
+        """The flight of the scenario with its nominal values."""
         return fly_law(self.scenario, self.entry, self.loop)
 
     @cached_property
     def linear(self) -> Linear | str:
-        """The linear loop."""
+        """The linear loop, or why there is none."""
         return self._by(linear_of)
 
     @cached_property
     def budget(self) -> Budget | str:
-        """The pointing budget."""
+        """The pointing budget, or why there is none."""
         return self._by(budgets.study)
 
     def _by(self, study: Callable[[Scenario, LawEntry], Known]) -> Known | str:
-        """Return what a study of attitudes gives, or why it gives nothing."""
+        """Return the result of a study of rigid bodies, or the reason why there is none."""
         if self.scenario.body != "rigid-body":
             return OTHER_BODY
         try:
@@ -93,7 +93,7 @@ class Evidence:
 
     @cached_property
     def issued(self) -> Sequence[Issued] | str:
-        """The certificates, each with the loop that it is about."""
+        """The certificates, each with its loop, or why there are none."""
         if self.scenario.supposed is not None:
             return "the law's nominal model is not the craft that flies"
         return study_of(self.scenario.body).certify(self.scenario, self.entry, self.loop, pointing=True)
@@ -105,7 +105,7 @@ class Evidence:
             return fly_campaign(self.scenario, Path(folder) / "campaign", self.entry.name, Options(search=False))
 
     def verdicts(self, notice: Notice, more: Collection[str] = ()) -> tuple[RequirementVerdict, ...]:
-        """Return the verdicts on all requirements, by the methods that they name; also run further methods whose evidence is
+        """Return the verdicts on all requirements by their methods; also run the methods `more`, whose evidence is
         needed."""
         scenario, entry = self.scenario, self.entry
         methods: dict[str, Callable[[], Verdicts]] = {
@@ -133,7 +133,7 @@ class Review(NamedTuple):
 
     @property
     def has_budget(self) -> bool:
-        """Return whether a [budget] table or a requirement calls for a pointing budget."""
+        """Whether a [budget] table or a requirement asks for a pointing budget."""
         return _asks_budget(self.evidence.scenario)
 
     @property
@@ -143,9 +143,9 @@ class Review(NamedTuple):
 
 
 def study(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> tuple[RequirementVerdict, ...]:
-    """Decide the requirements of a scenario for one of its laws by the methods that they name; one flight, one campaign, one
-    certificate, one budget and one linear loop serve all of them. `notice` is called with the number of methods done, the
-    total and the next one. InputError for any mistake in a requirement, before anything is flown or proved."""
+    """Return the verdicts on the requirements of a scenario for one of its laws, by their methods; one flight, campaign,
+    certificate, budget and linear loop serve all of them. `notice` is called with the number of methods done, the total and
+    the next method. InputError for any mistake in a requirement, before anything is flown or proved."""
     if not scenario.table.requirement:
         raise InputError(scenario.where, "requirement", "none", "at least one [[requirement]] table")
     check(scenario, entry)
@@ -153,8 +153,8 @@ def study(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> tuple
 
 
 def examine(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> Review:
-    """Collect what a review of a law shows: the verdicts, if anything is required, a flight, the linear loop, certificates,
-    and the budget and the campaign that the scenario defines; each is computed once. InputError as in `study`, and for any
+    """Return the contents of a law's review: the verdicts, if anything is required, a flight, the linear loop, certificates,
+    and the budget and the campaign that the scenario defines, each computed once. InputError as in `study`, and for any
     mistake in the [campaign] table."""
     check(scenario, entry)
     more = ["margin", "flight", "proof", *(["budget"] if _asks_budget(scenario) else [])]
@@ -170,8 +170,8 @@ def _asks_budget(scenario: Scenario) -> bool:
 
 
 def check(scenario: Scenario, entry: LawEntry) -> None:
-    """Raise InputError for any mistake in a requirement: a metric that its method does not measure, a limit in another unit,
-    a mode that the law lacks, a campaign that the scenario lacks."""
+    """Raise InputError for any mistake in a requirement: a metric that its method does not measure, a limit in a wrong unit,
+    an unknown mode, or a missing [campaign] table."""
     refuse_other_bodies(scenario)
     if scenario.body == "rigid-body":
         check_proofs(scenario, entry)
@@ -183,7 +183,7 @@ def check(scenario: Scenario, entry: LawEntry) -> None:
 
 
 def by_campaign(scenario: Scenario, result: CampaignResult) -> Verdicts:
-    """The verdicts of a scenario's campaign on its only law."""
+    """Return the verdicts of a scenario's campaign on its only law."""
     tables = tables_of(scenario, "campaign")
     verdicts: Verdicts = {}
     judged = zip(tables.items(), result.requirements, result.laws[0].verdicts, strict=True)

@@ -1,5 +1,5 @@
-"""Processes of this machine that fly blocks. Each communicates with this one alone, through a private pipe, and ends when
-this one does."""
+"""Worker processes on this machine that fly blocks. Each communicates only with this process, through a private pipe, and
+ends with it."""
 
 import multiprocessing
 import os
@@ -17,11 +17,11 @@ from typing import Any
 from starhold.errors import InputError
 
 TRIES = 3
-"""The number of processes that may die with a block before the block counts as the cause."""
+"""The number of processes that may die while flying a block before the block counts as the cause."""
 AHEAD = 2
-"""The number of blocks that a process has: one being flown, and one ready to follow."""
+"""The number of blocks sent to a process: one being flown, and one waiting."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""Variables that keep libraries of a process from starting a thread for each core."""
+"""Environment variables that keep libraries from starting a thread per core."""
 
 
 @dataclass
@@ -70,14 +70,14 @@ class Team:
         finally:
             for name, value in kept.items():
                 os.environ.pop(name) if value is None else os.environ.update({name: value})
-            # Only the process keeps its end, so that its death is seen here.
+            # Only the worker keeps its end open, so that its death is noticed here.
             other.close()
         self._workers.append(_Worker(process, pipe))
         return self._workers[-1]
 
     def fly(self, blocks: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
-        """Yield each block with its result, as they arrive. InputError where processes cannot be started, or where all that
-        try a block die."""
+        """Yield each block with its result, in order of arrival. InputError where processes cannot be started, or where all
+        that fly a block die."""
         waiting, deaths = deque(blocks), Counter[Any]()
         while waiting or any(worker.blocks for worker in self._workers):
             for worker in self._workers:
@@ -101,11 +101,11 @@ class Team:
         try:
             worker.pipe.send(worker.blocks[-1])
         except OSError:
-            # It has ended, which the wait for its results will show.
+            # The worker has ended, which the wait for its results will show.
             return
 
     def _replace(self, worker: _Worker, deaths: Counter[Any]) -> None:
-        """Start a process in the place of one that has ended."""
+        """Start a process to replace one that has ended."""
         self._workers.remove(worker)
         worker.pipe.close()
         worker.process.join()
@@ -116,7 +116,7 @@ class Team:
         self._start(1)
 
     def _cannot_start(self, reason: str) -> InputError:
-        hint = 'a script needs `if __name__ == "__main__":` before what starts workers'
+        hint = 'a script needs `if __name__ == "__main__":` before the code that starts workers'
         return InputError(self._name, "", "", f"cannot be started: {reason}; {hint}")
 
     def close(self) -> None:
@@ -129,7 +129,7 @@ class Team:
 
 
 def _serve(pipe: Any, work: Callable[..., Any], begun: tuple[Any, ...]) -> None:
-    """Work on blocks from a pipe until it is closed."""
+    """Process blocks from a pipe until it is closed."""
     follow_parent()
     try:
         pipe.send(None)
@@ -140,7 +140,7 @@ def _serve(pipe: Any, work: Callable[..., Any], begun: tuple[Any, ...]) -> None:
 
 
 def follow_parent() -> None:
-    """Leave keyboard interrupts to the parent of this process, and end with it, however that ends."""
+    """Ignore keyboard interrupts, which the parent process handles, and end with the parent, however it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
@@ -154,8 +154,8 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def _undisturbed() -> Generator[None]:
-    """Defer termination signals until processes are started, because a half-started one would print a traceback. Started
-    processes ignore keyboard interrupts, which reach all processes of a terminal; this one ends the others.
+    """Defer termination signals until processes are started, because an incompletely started one would print a traceback.
+    Started processes ignore keyboard interrupts, which reach all processes of a terminal; this process ends the others.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -164,8 +164,8 @@ def _undisturbed() -> Generator[None]:
     handlers = {
         number: signal.signal(number, lambda *call: signals.append(call)) for number in (signal.SIGINT, signal.SIGTERM)
     }
-    # Threads and processes inherit the signal mask of the thread that starts them; the start of Python's tracker unblocks
-    # all.
+    # Threads and processes inherit the signal mask of the thread that starts them; starting Python's resource tracker
+    # unblocks all signals.
     resource_tracker.ensure_running()
     masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if hasattr(signal, "pthread_sigmask") else None
     try:

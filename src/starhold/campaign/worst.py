@@ -1,4 +1,4 @@
-"""Searches for the worst value of a metric over the box of the dispersions by batches of flights, from many starts."""
+"""Searches for the worst value of a metric over the box of the dispersions, by batches of flights from many starts."""
 
 import math
 import re
@@ -18,10 +18,10 @@ from starhold.studies.requirements import LOST, Requirement
 
 Array = NDArray[np.float64]
 TAIL = 0.00135
-"""The probability that the box leaves out on each side of an unbounded distribution: that beyond three sigma of a normal
+"""The probability excluded from the box on each side of an unbounded distribution, that beyond three sigma of a normal
 one."""
 EDGE = 1e-12
-"""The probability that it leaves out of a bounded one, whose ends are not drawn."""
+"""The probability excluded on each side of a bounded distribution, whose bounds themselves are not drawn."""
 
 
 class Effort(NamedTuple):
@@ -36,24 +36,24 @@ class Effort(NamedTuple):
 
 MANY = Effort(2048, 16, 512, 30)
 FEW = Effort(256, 4, 64, 9)
-"""The size where the numbers of many runs are made at once, and where each lane's are made by themselves."""
+"""The effort where the loops of many runs are made at once, and where each is made alone."""
 CORNERS = 0.25
-"""The share of the spread points that lie in corners of the box."""
+"""The share of the initial points that lie in corners of the box."""
 APART = 0.1
-"""Starts differ by at least this share of the box along one of its sides."""
+"""The least distance between starts along one side of the box, as a share of the side."""
 FIRST, LONGEST, WIDER, CLOSER = 0.15, 0.3, 1.2, 0.7
-"""Step sizes as shares of the box: the first, the largest, and the factors after a round that found a worse point and after
-one that found none."""
+"""Step sizes as shares of the box: the initial and the largest one, and the factors after a round that found a worse point
+and after one that did not."""
 
 
 _ODD = re.compile(r"[^\w.-]+")
 """Characters that are replaced in file names."""
 _LONGEST = 200
-"""The most bytes of a file's name, without the number that makes it unique; systems allow 255."""
+"""The most bytes of a file name, without the number that makes it unique; file systems allow 255."""
 
 
 class Found(NamedTuple):
-    """The worst run of a search: the point of the unit cube (dims,), the values drawn there by column, the metric (NaN: the
+    """The worst run of a search: its point in the unit cube (dims,), the values drawn there by column, its metric (NaN: the
     run has none), and the number of flights."""
 
     point: Array
@@ -63,7 +63,7 @@ class Found(NamedTuple):
 
 
 def box(job: Job) -> list[tuple[float, float]]:
-    """Return the bounds of each uniform: all of a bounded distribution, else all but its tails."""
+    """Return the bounds of each uniform in the box, which excludes the tails of unbounded distributions."""
     bounds: list[tuple[float, float]] = []
     for dispersion in job.dispersions:
         tail = EDGE if dispersion.distribution.bounded else TAIL
@@ -72,7 +72,7 @@ def box(job: Job) -> list[tuple[float, float]]:
 
 
 class Sought(NamedTuple):
-    """A search: what it is for, and the most flights that it adds to those of the campaign."""
+    """A search in progress: its purpose, and the most flights that it adds to those of the campaign."""
 
     name: str
     flights: int
@@ -87,11 +87,11 @@ def search(
     seed: int = 0,
     notice: Callable[[str, int, Sought], None] | None = None,
 ) -> Found | None:
-    """Search for the worst value of a requirement's metric over the box, with the random numbers of run 0 in all flights.
-    begin: a point (dims,) to search around as well. The search ends early where a run has no such value, the worst case;
-    None where no scenario within the box can be flown. It is an evolution strategy from many starts: a batch of random steps
-    is flown from each, and the worst is kept; step sizes adapt, and the less bad half of the starts is dropped after each
-    third of the rounds. notice: called with the law and how many more of these flights are done, or needed no more.
+    """Return the worst run for a requirement's metric over the box, with the random numbers of run 0 in all flights; None if
+    no scenario within the box can be flown. begin: a further point (dims,) to search around. The search ends early at a run
+    without a value, the worst case. It is an evolution strategy from many starts: a batch of random steps is flown from
+    each, and the worst is kept; step sizes adapt, and the less bad half of the starts is dropped after each third of the
+    rounds. notice: called with the law and the number of further flights that are done or no longer needed.
     """
     side = 1.0 if requirement.at_most else -1.0
     evaluations = 0
@@ -157,8 +157,8 @@ def search(
 
 
 def _apart(points: Array, values: Array, least: Array, most: int) -> list[int]:
-    """Return the indices of the worst points (n, dims) that differ from each other by at least the least distance along some
-    side."""
+    """Return the indices of at most `most` of the worst points (n, dims) whose mutual distance along some side is at least
+    `least`."""
     apart: list[int] = []
     for place in np.argsort(-values, kind="stable").tolist():
         if all((np.abs(points[place] - points[other]) > least).any() for other in apart):
@@ -169,7 +169,7 @@ def _apart(points: Array, values: Array, least: Array, most: int) -> list[int]:
 
 
 def _stepped(points: Array, sizes: Array, count: int, low: Array, high: Array, sought: np.random.Generator) -> Array:
-    """Return points (n, count, dims) a random step away from each of these (n, dims), along some sides of the box."""
+    """Return points (n, count, dims) at random steps from each of the points (n, dims), along some sides of the box."""
     each = (len(points), count, 1)
     step = sought.normal(size=(len(points), count, len(low))) * sizes[:, None, None] * sought.lognormal(0.0, 0.7, each)
     step *= sought.random(step.shape) < sought.random(each)
@@ -184,9 +184,9 @@ def brackets(
     taken: set[str],
     notice: Callable[[str, int, Sought], None] | None = None,
 ) -> tuple[Bracket, ...]:
-    """Bracket the worst value of each required metric of a law: by its campaign, by a search, and by proof. The worst run of
-    each is kept as a scenario file in the campaign's folder; taken: the names of such files so far; notice: as in
-    `search`."""
+    """Return brackets of the worst value of each required metric of a law, from its campaign, a search, and a proof. The
+    worst run of each is written as a scenario file to the campaign's folder; taken: the names of such files so far; notice:
+    as in `search`."""
     gathered: list[Bracket] = []
     law, worst_runs = result.law, {verdict.name: verdict.worst_run for verdict in result.verdicts}
     for requirement in job.requirements(law):
@@ -207,7 +207,7 @@ def brackets(
 
 
 def _file_name(law: str, requirement: str, taken: set[str]) -> str:
-    """Return the file name of the worst run, which is added to those taken."""
+    """Return a new file name for the worst run and add it to those taken."""
     stem = f"worst-{law}-{_ODD.sub('-', requirement)}".encode()[:_LONGEST].decode(errors="ignore")
     names = (f"{stem}{'' if number == 1 else f'-{number}'}.toml" for number in count(1))
     name = next(name for name in names if name.casefold() not in taken)
@@ -220,9 +220,9 @@ _FOLLOWING = ("lag", "rate-limit")
 
 
 def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | None, str]:
-    """Return the bound of a metric that holds over all draws, and its basis; None where nothing is proved. The saturation
-    limit of the command bounds the torque on the body, if no effector produces the torque, no actuator amplifies it, and no
-    draw changes the limit. Claims of certificates are about flights that have their premises alone: `proved` has these.
+    """Return a bound on a metric that holds for all draws, and its basis; None where none is proved. The saturation limit of
+    the command bounds the torque on the body, if no effector produces the torque, no actuator amplifies it, and no draw
+    changes the limit. Claims of certificates hold only for flights that meet their premises; see `proved`.
     """
     lanes = job.lanes(law)
     loop = lanes.base.loop
@@ -236,4 +236,4 @@ def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | Non
     limit = max(phase.setup.limit for phase in loop.phases(lanes.steps))
     bound = limit * (axes if loop.limit == "axis" else 1.0)
     cut = "each component" if loop.limit == "axis" else "the norm"
-    return bound, f"the actuators limit {cut} of the torque off at {limit:.6g} N m"
+    return bound, f"the actuators saturate {cut} of the torque at {limit:.6g} N m"

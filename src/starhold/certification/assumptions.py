@@ -130,6 +130,11 @@ def _pulled(span: Any) -> Unmet:
     return [(span.loop.has("gravity-gradient"), "the gravity gradient acts")]
 
 
+def _told(span: Any) -> Unmet:
+    modelled = any(fitted.part.flag("MODELLED") for fitted in span.loop.used("environment"))
+    return [(modelled, "the law is told of a torque from outside")]
+
+
 def _unsure(span: Any) -> Unmet:
     names = (f"{fitted.called.replace('-', '_')}_{IS_VALID}" for fitted in span.loop.used("estimator"))
     return [(span[name] < 0.5, "the estimate is not valid") for name in names]
@@ -177,6 +182,7 @@ ASSUMPTIONS = {
     "no-wheels": Assumption("no stored momentum"),
     "no-outside-torque": Assumption("no torque from outside", _pulled),
     "known-outside-torque": Assumption("no torque from outside but what the law cancels", _uncancelled),
+    "untold-torque": Assumption("a law that is told of no torque from outside", _told),
     "bounded-outside-torque": Assumption("torque from outside bounded on each axis"),
     "changing-outside-torque": Assumption("torque from outside told as at the attitude told, its rate bounded"),
     "unknown-outside-torque": Assumption("torque from outside bounded in norm"),

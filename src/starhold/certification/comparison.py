@@ -21,7 +21,7 @@ from starhold.certification.matrices import above, fraction
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, noisy_fields, samples_of
 from starhold.kernel.held import CHANGE
-from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
+from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, TOLD_TORQUE, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.plans import PLANNED
 from starhold.kernel.theorems.noise import BESIDE, DEVIATION, VECTORS
@@ -30,6 +30,8 @@ from starhold.parts.contract import DEVIATIONS
 from starhold.parts.effectors.wheel_motion import at_top_speed
 from starhold.parts.effectors.wheels import BAND, gives_allocated_torque
 
+BOUNDED = (POINTS, APPENDED)
+"""The theorems about loops with pushes that are bounded."""
 ALMOST = Fraction(1, 10**9)
 """A share by which the field along an orbit may be another one, for floats tell it."""
 
@@ -99,7 +101,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
         exactly[VECTORS] = noisy_fields(loop)
         numbers |= {} if VECTORS in numbers or BESIDE not in numbers else {VECTORS: Fraction(1)}
-    if claim["theorem"] in (POINTS, APPENDED):
+    if claim["theorem"] in BOUNDED:
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
         pushed = known.against(envelope).numbers
@@ -188,5 +190,7 @@ def _words(claim: Mapping[str, Any], loop: Loop) -> Iterator[str]:
         yield "the sign of the quaternion is chosen in another way"
     if theorem != SAMPLED and (WHEELS in taken) != (loop.loop.wheels is not None):
         yield "only one of the two has wheels"
+    if theorem in BOUNDED and OUTSIDE not in taken and any(loop.known.modelled) and loop.is_told(TOLD_TORQUE):
+        yield "its law is told of a torque from outside"
     if WHEELS in taken and loop.loop.wheels is not None and not gives_allocated_torque(loop.loop.wheels):
         yield "its wheels do not give the torque that is allocated to them"

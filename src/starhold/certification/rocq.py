@@ -4,10 +4,9 @@ its evidence by the rules in rocq.v. Polynomials are multiplied by positive numb
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from functools import reduce
 from importlib import resources
 from itertools import chain
-from math import isqrt, lcm, prod
+from math import ceil, isqrt, lcm, prod
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -19,7 +18,7 @@ from starhold.kernel.polynomials import Poly, apply, dot, poly, read_poly, total
 
 WORDS = {
     *("as", "at", "cofix", "else", "end", "exists", "fix", "for", "forall", "fun", "if", "in", "let", "match", "mod"),
-    *("return", "then", "using", "where", "with", "I", "R", "Z"),
+    *("return", "then", "using", "where", "with", "R", "exceeds", "num", "shows", "vanishes"),
 }
 """What no variable is called."""
 
@@ -44,6 +43,12 @@ class Lemma(NamedTuple):
     parts: Sequence[Part] = ()
 
 
+class Matrix(NamedTuple):
+    """A symmetric matrix is positive definite."""
+
+    rows: Rows
+
+
 Polynomial: TypeAlias = rules.Vanishes | rules.Squares | rules.Sum | rules.Contracts | rules.Persists | rules.Definite
 """Obligations about polynomials; the other compares two numbers."""
 
@@ -51,26 +56,29 @@ Polynomial: TypeAlias = rules.Vanishes | rules.Squares | rules.Sum | rules.Contr
 def printed(proved: Sequence[Proved]) -> str:
     """Return the text of a file that coqc accepts, with a lemma, or some, for each obligation that was checked."""
     Account.left = 10**12
-    lines = [resources.files("starhold.certification").joinpath("rocq.v").read_text(encoding="utf-8")]
+    lines = list[str]()
     for i, one in enumerate(proved):
         lines.append(f"(* {_remark(one.statement.written())} *)\n")
         for k, (name, obligation) in enumerate(one.obligations):
             lines.append(f"(* {_remark(name)} *)")
             evidence = one.claim.evidence.content.get(name)
-            for j, text in enumerate(_texts(obligation, evidence)):
-                lines.append(f"Lemma claim{i}_{k}_{j} : {text}\n")
-    return "\n".join(lines)
+            lines += (f"{text}\n" for text in _texts(obligation, evidence, f"claim{i}_{k}"))
+    # A place among variables is one word of the file's own, which is read sooner than a numeral.
+    count = max((int(x) + 1 for line in lines for x in re.findall(r"\bv(\d+) ", line)), default=0)
+    rules = resources.files("starhold.certification").joinpath("rocq.v").read_text(encoding="utf-8")
+    return "\n".join([rules, *(f"Definition v{k} := v {k}." for k in range(count)), "", *lines])
 
 
-def _texts(o: rules.Obligation, evidence: Any) -> Iterator[str]:
+def _texts(o: rules.Obligation, evidence: Any, name: str) -> Iterator[str]:
     if isinstance(o, rules.Exceeds):
-        small, large = (f"{x.numerator} # {x.denominator}" for x in (Fraction(o.small), o.large))
-        yield f"({small} < {large})%Q.\nProof. reflexivity. Qed."
+        small, large = (f"num {_number(x.numerator)} / num {_number(x.denominator)}" for x in (Fraction(o.small), o.large))
+        yield _proved(f"{name}_0", f"{small} < {large}", "apply smaller.", CHECKED)
     else:
-        yield from map(_text, lemmas(o, evidence))
+        for j, given in enumerate(lemmas(o, evidence)):
+            yield _definite(f"{name}_{j}", given.rows) if isinstance(given, Matrix) else _text(f"{name}_{j}", given)
 
 
-def lemmas(o: Polynomial, evidence: Any) -> Iterator[Lemma]:
+def lemmas(o: Polynomial, evidence: Any) -> Iterator[Lemma | Matrix]:
     """Yield what an obligation says, with its evidence."""
     if isinstance(o, rules.Vanishes):
         yield Lemma(o.p, None, _polys(evidence or []), o.modulo)
@@ -86,25 +94,25 @@ def lemmas(o: Polynomial, evidence: Any) -> Iterator[Lemma]:
         low = dot([rational(x) for x in evidence["numbers"]], o.strict)
         yield Lemma(o.p, low, _polys(evidence["cofactors"]), o.modulo, o.known, [*map(_part, evidence["parts"])])
     elif isinstance(o, rules.Definite):
-        yield _form(o.a)
+        yield Matrix(o.a)
     elif isinstance(o, rules.Contracts):
         yield from _contracting(o, matrix(evidence, len(o.A), len(o.A)))
     else:
         yield from _persisting(o.A, matrix(evidence, len(o.A), len(o.A)))
 
 
-def _form(a: Rows, p: Poly | None = None, cofactors: Sequence[Poly] = (), zeros: Sequence[Poly] = ()) -> Lemma:
-    """Return that x'ax, or what is the same but for zeros, exceeds a multiple of |x|^2."""
+def _form(a: Rows, p: Poly, cofactors: Sequence[Poly], zeros: Sequence[Poly]) -> Lemma:
+    """Return that p, which is x'ax but for zeros, exceeds a multiple of |x|^2."""
     x, (c, rest) = _vector("x", len(a)), _least(a, len(a))
-    return Lemma(p or dot(x, apply(a, x)), c * dot(x, x), cofactors, zeros, (), [Part([], x, rest)])
+    return Lemma(p, c * dot(x, x), cofactors, zeros, (), [Part([], x, rest)])
 
 
-def _contracting(o: rules.Contracts, P: Rows) -> Iterator[Lemma]:
-    """Yield that x'Px is positive, and that where y = Ax it is less for y than rate^2 times that for x, or decreases."""
+def _contracting(o: rules.Contracts, P: Rows) -> Iterator[Lemma | Matrix]:
+    """Yield that P is positive definite, and that where y = Ax its form decreases, or is below rate^2 times that of x."""
     x, y, PA = _vector("x", len(P)), _vector("y", len(P)), times(P, o.A)
     Ax, Px, Py = apply(o.A, x), apply(P, x), apply(P, y)
     zeros = [b - a for a, b in zip(Ax, y, strict=True)]
-    yield _form(P)
+    yield Matrix(P)
     if o.flow:
         yield _form(plus(scalar(0, len(P)), plus(PA, transpose(PA)), -1), dot(x, Py) * -2, [p * -2 for p in Px], zeros)
     else:
@@ -155,9 +163,30 @@ def _vector(letter: str, count: int) -> list[Poly]:
     return [var(f"{letter}{k}") for k in range(count)]
 
 
-def _text(given: Lemma) -> str:
+EASY = 6
+"""Rows of a matrix from which elimination takes long."""
+CHECKED = "vm_cast_no_check (eq_refl true)."
+"""The end of a proof by computation, which Rocq does where the proof is accepted."""
+
+
+def _proved(name: str, statement: str, *proof: str) -> str:
+    steps = "\n".join(f"  {step}" for step in proof)
+    return f"Lemma {name} : {statement}.\nProof.\n{steps}\nQed."
+
+
+def _definite(name: str, a: Rows) -> str:
+    """Return that a matrix times a number is positive definite, and its proof: of it less 1 on its diagonal."""
+    size, (c, _) = lcm(*(x.denominator for row in a for x in row)), _least(a, len(a))
+    size *= ceil(1 / (c * size))
+    size *= _room([[[size * x - (i == k) for k, x in enumerate(row)] for i, row in enumerate(a)]])
+    whole = [[size * x for x in row] for row in a]
+    squares = _squares([[x - (i == k) for k, x in enumerate(row)] for i, row in enumerate(whole)])
+    return _proved(name, f"positive_definite {_rows(_upper(whole))}", f"apply (positive {squares}).", CHECKED)
+
+
+def _text(name: str, given: Lemma) -> str:
     """Return what a lemma says and its proof, in which every number is whole."""
-    size, (p, *low) = _whole(given.p, *([] if given.low is None else [given.low]))
+    size, (p, low) = _whole(given.p, given.low or Poly({}))
     used = [(c, r) for c, r in zip(given.cofactors, given.zeros, strict=True) if c.terms]
     zeros, known = [_whole(r) for _, r in used], {k: _whole(given.known[k]) for part in given.parts for k in part.of}
     cofactors = [c * (size / of) for (c, _), (of, _) in zip(used, zeros, strict=True)]
@@ -165,26 +194,26 @@ def _text(given: Lemma) -> str:
     for of, z, gram in given.parts:
         multiple, whole = _whole(*z)
         share = size / multiple / multiple / prod(known[k][0] for k in of)
-        parts.append(Part(of, whole, [[share * x for x in row] for row in gram]))
+        parts.append(Part([[*known].index(k) for k in of], whole, [[share * x for x in row] for row in gram]))
     fractions = chain(*(c.terms.values() for c in cofactors), *(row for part in parts for row in part.gram))
-    K = lcm(*(x.denominator for x in fractions))
-    relations, sides = [r for _, (r,) in zeros], {k: g for k, (_, (g,)) in known.items()}
-    polys = [p, *low, *relations, *sides.values(), *cofactors, *(x for part in parts for x in part.z)]
+    least = lcm(*(x.denominator for x in fractions))
+    K = least * _room([[[least * x for x in row] for row in part.gram] for part in parts])
+    relations, sides = [r for _, (r,) in zeros], [g for _, (g,) in known.values()]
+    polys = [p, low, *relations, *sides, *cofactors, *(x for part in parts for x in part.z)]
     write = Writer(_names({name for q in polys for name in q.names}))
-    variables, hypotheses = list(write.names.values()), [f"Z{k}" for k in range(len(zeros))]
-    premises = [*(f"{write.sum(r)} = 0" for r in relations), *(f"0 <= {write.sum(g)}" for g in sides.values())]
-    premises.append(f"{write.sum(low[0])} <= {write.sum(p)}" if low else f"{write.sum(p)} = 0")
-    rule = ["exceeds" if low else "vanishes", f"[{'; '.join(variables)}]", _number(K), *map(write.terms, [p, *low])]
-    rule += [write.list(c * K for c in cofactors), write.list(relations)]
-    if low:
-        rule.append(f"[{'; '.join(write.part(part, [sides[k] for k in part.of], K) for part in parts)}]")
-    rule += ["_", _all(hypotheses)]
-    if low:
-        rule.append(_all(_all(f"K{k}" for k in part.of) for part in parts))
-    before = f"forall {' '.join(variables)} : R, " if variables else ""
-    named = " ".join([*variables, *hypotheses, *(f"K{k}" for k in sides)])
-    proof = f"intros {named}.\n  refine ({' '.join(rule)}).\n  vm_cast_no_check (eq_refl true)."
-    return f"{before}{' -> '.join(premises)}.\nProof.\n  {proof}\nQed."
+    premises = [*(f"{write.sum(r)} = 0" for r in relations), *(f"0 <= {write.sum(g)}" for g in sides)]
+    premises.append(f"{write.sum(p)} = 0" if given.low is None else f"{write.sum(low)} <= {write.sum(p)}")
+    data = [_number(K), write.terms(p), write.terms(low), *map(write.list, (relations, sides, [c * K for c in cofactors]))]
+    data.append(f"[{'; '.join(write.part(part, K) for part in parts)}]")
+    rule, condition = ("vanishes", "level") if given.low is None else ("exceeds", "holds")
+    variables = " ".join(write.names.values())
+    every, each = (f"forall {variables} : R, ", f"fun {variables} : R => ") if variables else ("", "")
+    return f"Definition {name}_evidence := Shown {' '.join(data)}.\n" + _proved(
+        name,
+        f"{every}{' -> '.join(premises)}",
+        f"assert (shows : {condition} {name}_evidence = true) by ({CHECKED[:-1]}).",
+        f"exact_no_check ({each}{rule} _ shows [{'; '.join(write.names.values())}]).",
+    )
 
 
 class Writer:
@@ -195,64 +224,91 @@ class Writer:
 
     def sum(self, p: Poly) -> str:
         """Write a polynomial for reading."""
-        return " + ".join(" * ".join([_number(c), *(self.names[x] for x in m)]) for m, c in p.terms.items()) or "0"
+        rows = (" * ".join([f"num {_number(c)}", *(self.names[x] for x in m)]) for m, c in p.terms.items())
+        return " + ".join(rows) or "0"
 
     def terms(self, p: Poly) -> str:
         """Write a polynomial for the rules."""
-        rows = (f"({_number(c)}, [{'; '.join(f'{self.places[x]}' for x in m)}]%nat)" for m, c in p.terms.items())
-        return f"[{'; '.join(rows)}]%Z"
+        rows = [f"t {_number(c)} {_places(self.places[x] for x in m)}" for m, c in p.terms.items()]
+        return _nested(rows, "o")
 
     def list(self, polys: Iterable[Poly]) -> str:
         """Write polynomials for the rules."""
         return f"[{'; '.join(map(self.terms, polys))}]"
 
-    def part(self, part: Part, known: Sequence[Poly], K: int) -> str:
+    def part(self, part: Part, K: int) -> str:
         """Write a part of a sum, times K, for the rules."""
         gram = [[K * x for x in row] for row in part.gram]
-        rows = (f"[{'; '.join(map(_number, row[i:]))}]" for i, row in enumerate(gram))
-        size, error, taken = _taken(gram)
-        shares = "; ".join(f"[{'; '.join(map(_number, u))}]" for u in taken)
-        of = f"{self.list(known)} {self.list(part.z)} [{'; '.join(rows)}]%Z"
-        return f"Build_part {of} {_number(size)} {_number(error)} [{shares}]%Z"
+        return f"Part {_places(part.of)} {self.list(part.z)} {_rows(_upper(gram))} {_squares(gram)}"
+
+
+def _nested(words: Sequence[str], last: str) -> str:
+    return f"{''.join(f'({word} ' for word in words)}{last}{')' * len(words)}"
+
+
+def _places(places: Iterable[int]) -> str:
+    return _nested([f"v{k}" for k in places], "e")
+
+
+def _rows(rows: Iterable[Iterable[Fraction | int]]) -> str:
+    written = (", ".join(map(_number, row)) for row in rows)
+    return f"[{'; '.join(f'(|{row}|)' for row in written)}]"
+
+
+def _upper(a: Rows) -> list[list[Fraction]]:
+    """Return the rows of a symmetric matrix from the diagonal on."""
+    return [row[i:] for i, row in enumerate(a)]
 
 
 def _number(x: Fraction | int) -> str:
-    """Write a whole number; Rocq reads long ones far sooner from hexadecimal digits."""
-    return f"({int(x)})" if abs(x) < 10**30 else f"({int(x):#x})"
+    """Write a whole number; Rocq reads long ones sooner from hexadecimal digits."""
+    text = f"{int(x)}" if abs(x) < 10**6 else f"{int(x):#x}"
+    return f"({text})" if x < 0 else text
+
+
+def _squares(gram: Rows) -> str:
+    """Write how squares leave little of a matrix."""
+    size, error, taken = _taken(gram)
+    return f"{size} {error} {_rows(taken)}"
+
+
+def _room(grams: Sequence[Rows]) -> int:
+    """Return by what matrices of whole numbers are multiplied so that short squares leave little of each, or 1."""
+    large = [gram for gram in grams if len(gram) > EASY]
+    return next((c for c in (1, 2**40, 2**80) if all(_taken([[c * x for x in row] for row in a])[2] for a in large)), 1)
 
 
 def _taken(gram: Rows) -> tuple[int, int, list[list[int]]]:
-    """Return m, e and short u such that a matrix less the sum of m uu' has entries of at most e off its diagonal, and count
-    times e on it; no u where there are none."""
+    """Return s, r and short u, each from its pivot on, such that a matrix less the sum of 2^s uu' has entries of at most 2^r
+    off its diagonal, and count times 2^r on it; no u where there are none."""
     G, count = [[int(x) for x in row] for row in gram], len(gram)
     bits = max((row[k].bit_length() for k, row in enumerate(G)), default=0)
-    for s in range(bits - 40, -1, -20):
-        # Entries of u are rounded, so that those of m uu' are off by m times the largest at most.
-        error = 2 ** ((s + bits) // 2 + 1)
-        taken = _factored([[x - count * error * (i == k) for k, x in enumerate(row)] for i, row in enumerate(G)], 2**s)
+    for s in (*range(bits - 40, 0, -20), 0):
+        # Entries of u are rounded, so that those of uu' are off by the largest at most.
+        r = (s + bits) // 2 + 1
+        taken = _factored([[x - (count * (i == k) << r) for k, x in enumerate(row)] for i, row in enumerate(G)], 2**s)
         if taken:
-            return 2**s, error, taken
+            return s, r, taken
     return 0, 0, []
 
 
 def _factored(rest: list[list[int]], m: int) -> list[list[int]]:
-    """Return the rows of U such that m U'U is a matrix, but for what is rounded, or none where it is not positive."""
+    """Return the rows of U, from the diagonal on, such that m U'U is a matrix, but for what is rounded, or none where it is
+    not positive."""
+    rows: list[list[int]] = [row[i:] for i, row in enumerate(rest)]
     taken = list[list[int]]()
-    for k in range(len(rest)):
-        pivot = isqrt(max(rest[k][k], 0) // m)
+    while rows:
+        pivot = isqrt(max(rows[0][0], 0) // m)
         if not pivot:
             return []
-        u = [0] * k + [pivot] + [(2 * x + m * pivot) // (2 * m * pivot) for x in rest[k][k + 1 :]]
-        for i in range(k, len(rest)):
-            for j in range(k, len(rest)):
-                rest[i][j] -= m * u[i] * u[j]
+        u: list[int] = [pivot, *((2 * x + m * pivot) // (2 * m * pivot) for x in rows[0][1:])]
+        rows = [
+            [x - m * a * b for x, b in zip(row, u[i:], strict=True)]
+            for i, (row, a) in enumerate(zip(rows, u, strict=True))
+            if i
+        ]
         taken.append(u)
     return taken
-
-
-def _all(proofs: Iterable[str]) -> str:
-    """Join proofs to one of all."""
-    return reduce(lambda rest, one: f"(conj {one} {rest})", reversed([*proofs]), "I")
 
 
 def _whole(*polys: Poly) -> tuple[Fraction, list[Poly]]:

@@ -235,6 +235,7 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name] > 1e-12]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
+    bounds[-1] += " of the inertia as given" * ("momentum" in n and "tolerance" in n)
     bounds += [OFF.format(shown(100.0 * n["tolerance"], " %"))] if "tolerance" in n else []
     bounds += [f"a memory that adds up to {shown(n['memory'], ' N m')} about each axis"] if "memory" in n else []
     bounds += [f"a plan within {shown(n['plan_error'], ' N m', up=True)} of a polynomial"] if "plan_error" in n else []

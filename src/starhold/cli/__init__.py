@@ -1,1 +1,1 @@
-"""The commands: each reads its arguments, calls the library and prints. `main` registers them all."""
+"""The command line: each command reads its arguments, calls the library and prints. `main` registers all of them."""

@@ -12,7 +12,7 @@ ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario fi
 
 
 def results_in(where: str) -> Any:
-    """The option that names the folder for results."""
+    """Return the option that names the folder for results."""
     return typer.Option("-o", "--output", metavar="DIR", help=f"folder for results, created; else results/{where}")
 
 
@@ -27,17 +27,21 @@ Rocq = Annotated[bool, typer.Option("--rocq", help="also write the proofs as lem
 Why = Annotated[bool, typer.Option("--why", help="state how each claim was shown and what it assumes")]
 Unstable = Annotated[bool, typer.Option("--allow-unstable", help="accept gains that are known to be unstable")]
 Certified = Annotated[bool, typer.Option("--certify/--no-certify", help="prove what the laws guarantee, or only fly")]
-Proof = Annotated[bool, typer.Option("--proof", help="also prove how near to the target the loop stays; this takes seconds")]
-CheckStep = Annotated[bool, typer.Option("--check-step", help="fly again with half the step: what changes?")]
+Proof = Annotated[
+    bool, typer.Option("--proof", help="also prove a pointing bound of the loop as it flies; this takes seconds")
+]
+CheckStep = Annotated[
+    bool, typer.Option("--check-step", help="fly again with half the integration step and show the changes")
+]
 
 
 class Drawn(StrEnum):
-    """The choice of what is drawn once the table is printed."""
+    """The pictures to draw after the table is printed."""
 
     NONE = "none"
     PAGE = "page"
     ALL = "all"
 
 
-Pictures = Annotated[Drawn, typer.Option("--pictures", help="draw nothing, report.html only, or PNG files too")]
+Pictures = Annotated[Drawn, typer.Option("--pictures", help="no pictures, report.html only, or PNG files too")]
 OneLaw = Annotated[str | None, typer.Option(help="which law of the file; all if not given")]

@@ -1,4 +1,4 @@
-"""Commands print here, and show their progress."""
+"""The console on which commands print and show their progress."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if not console.is_terminal:
 
 
 def bars_with(*columns: ProgressColumn | str) -> Progress:
-    """Return progress bars: what is done, how far, how much of it, and these further columns."""
+    """Return progress bars with a description, a bar, the amount done, and these further columns."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress
 
     return Progress("{task.description}", BarColumn(), MofNCompleteColumn(), *columns, console=console)

@@ -1,4 +1,4 @@
-"""The command line. Commands read, call and print; they import what they need when they run, so that each starts fast."""
+"""The command line. Commands read, call and print; they import the modules they need when they run, to start fast."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from starhold.errors import InputError, InterruptedByUserError
 
 
 def make_app(every: Mapping[str, Any]) -> typer.Typer:
-    """Make the application with these commands."""
+    """Return the application with these commands."""
     made = typer.Typer(
         help="Design, certify, fly and compare control laws for spacecraft.",
         no_args_is_help=True,
@@ -62,7 +62,7 @@ def main() -> None:
     if unsaid is not None and not isinstance(unsaid, BrokenPipeError):
         print(f"starhold: standard output cannot be written: {unsaid.strerror}", file=sys.stderr)
         code = code or USER_ERROR
-    # At the end the interpreter would look several times through all that was loaded for what is no longer in use.
+    # At exit the interpreter would search all loaded objects several times for garbage.
     gc.freeze()
     sys.exit(code)
 
@@ -71,7 +71,7 @@ def run_command() -> int:
     """Run the command in `sys.argv`, and return its exit code."""
     # Set before NumPy loads: on matrices as small as a law's, the threads of its library only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Nor are plugins of the library that reads tables sought in all installed packages.
+    # Pydantic need not search all installed packages for its plugins either.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
@@ -79,16 +79,16 @@ def run_command() -> int:
     # A command loads much and ends soon, so frequent garbage collection only costs time.
     gc.set_threshold(200_000)
     if sys.argv[1:] == ["--version"]:
-        # This path avoids the modules that parse options.
+        # This branch avoids loading the modules that parse options.
         print(_version())
         return 0
     if os.environ.get("_STARHOLD_COMPLETE", "").startswith("complete_"):
-        # A shell waits for names and needs no values, so the library that converts them is not loaded: completion takes a
-        # value that cannot be converted for absent.
+        # A shell waits for names and needs no values, so the library that converts them is not loaded: completion treats a
+        # value that cannot be converted as absent.
         sys.modules["pydantic"] = cast(ModuleType, None)
     chosen = {name: command for name, command in COMMANDS.items() if name in sys.argv[1:2]}
     try:
-        # Options of other commands than the one that is asked for take long to make.
+        # Options of other commands than the requested one take long to make.
         (make_app(chosen) if chosen else app)(standalone_mode=True)
     except SystemExit as ending:
         return ending.code if isinstance(ending.code, int) else int(ending.code is not None)
@@ -96,14 +96,14 @@ def run_command() -> int:
         print(f"starhold: {error}", file=sys.stderr)
         return USER_ERROR
     except InterruptedByUserError as interrupt:
-        print("starhold: interrupted; files already written are whole", file=sys.stderr)
+        print("starhold: interrupted; files already written are complete", file=sys.stderr)
         return 128 + interrupt.args[0]
     except OSError as error:
-        # A name that is too long, a full disk: an error of the system, not of the program.
+        # For example a name that is too long or a full disk: an error of the system, not of the program.
         print(f"starhold: {str(error.filename or '')[-100:]}: {error.strerror or error}", file=sys.stderr)
         return USER_ERROR
     except MemoryError:
-        print("starhold: not enough memory; simulation.record_every makes a run's record smaller", file=sys.stderr)
+        print("starhold: not enough memory; a larger simulation.record_every makes recordings smaller", file=sys.stderr)
         return USER_ERROR
     except Exception:
         traceback.print_exc()
@@ -112,6 +112,6 @@ def run_command() -> int:
 
 
 def _as_line(message: Warning | str, category: type[Warning], filename: str, number: int, line: str | None = None) -> str:
-    """Print a warning as one line, with its place in the source unless it is meant for users."""
+    """Return a warning as one line, with its place in the source unless it is meant for users."""
     place = "" if category is UserWarning else f"{category.__name__} at {filename}:{number}: "
     return f"starhold: warning: {place}{message}\n"

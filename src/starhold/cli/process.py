@@ -10,7 +10,7 @@ from starhold.errors import InterruptedByUserError
 
 
 class Outlet:
-    """A stream in place of `sys.stdout` or `sys.stderr`. The first write error is kept in `failure` and all later output is
+    """A stream in place of `sys.stdout` or `sys.stderr`. The first write error is stored in `failure` and later output is
     dropped, so that a command finishes its work and writes its files."""
 
     def __init__(self, stream: Any) -> None:
@@ -39,7 +39,7 @@ class Outlet:
 
     def _give_up(self, error: OSError) -> None:
         self.failure = self.failure or error
-        # The stream keeps what it could not send, and would fail again when Python exits.
+        # The stream keeps unsent output, and would fail again when Python exits.
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self._stream.fileno())
         os.close(nowhere)
@@ -58,12 +58,12 @@ _interrupted = Event()
 
 def on_signal(number: int, frame: object) -> None:
     """Handle a signal that ends the process."""
-    # Noted as well as raised, because an exception in a callback of the garbage collector is swallowed.
+    # Stored as well as raised, because an exception in a callback of the garbage collector is swallowed.
     _interrupted.set()
     raise InterruptedByUserError(number)
 
 
 def heed_interrupt() -> None:
-    """Raise the interrupt that was noted, if one was."""
+    """Raise the stored interrupt, if there is one."""
     if _interrupted.is_set():
         raise InterruptedByUserError(signal.SIGINT)

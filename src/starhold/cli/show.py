@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 COLUMN = 9
-"""Width of a metric in characters."""
+"""The width of a metric's column in characters."""
 
 
 @contextmanager
@@ -60,12 +60,12 @@ def print_outcome(flights: Sequence[Flight]) -> None:
 
 
 def print_results(path: Path) -> None:
-    """Print where the results are: the page, or the folder where there is no page."""
+    """Print the path of the results: the page, or the folder if there is no page."""
     console.print(f"{'Results' if path.is_dir() else 'Report'}: {path}", soft_wrap=True)
 
 
 def _step_text(flight: Flight) -> str:
-    """Print how much halving the integration step changes the metrics."""
+    """Return a sentence on the changes of the metrics when the integration step is halved."""
     errors = flight.metrics["step_error"]
     if None in errors.values():
         return f"{flight.name}: with half the integration step the motion diverges at another time"
@@ -86,7 +86,7 @@ def print_table(flights: Sequence[Flight]) -> None:
     measures = [metric_set.measures[metric] for metric in metrics]
     heads = [f"{measure.heading}\n[dim]{measure.unit}[/dim]" for measure in measures]
     cells = [[_cell(metric_set.cell(metric, results[name]), name in won[metric]) for metric in metrics] for name in order]
-    # Lines between thirteen columns would not fit into 120 characters.
+    # With lines between its columns the table would not fit into 120 characters.
     table = Table(box=SIMPLE_HEAD, collapse_padding=True, show_edge=False, pad_edge=False)
     if console.width >= max(WIDE, COLUMN * (1 + len(metrics))):
         for head in ("law", *heads):

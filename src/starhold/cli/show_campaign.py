@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from starhold.campaign.worst import Sought
 
 METRICS, DRIVERS, AGAIN = 8, 4, 3
-"""How many metrics, drivers of each kind and runs of a law are printed; the page lists all."""
+"""The numbers of metrics, of drivers of each kind, and of runs per law that are printed; the page lists all."""
 
 
 class Rate(ProgressColumn):
-    """Shows how many runs a second are flown."""
+    """A column with the number of runs flown per second."""
 
     def render(self, task: Task) -> Text:
         """Return the rate of a task as text, empty before it is known."""
@@ -38,11 +38,11 @@ class Rate(ProgressColumn):
 @contextmanager
 def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Iterator[Callable[..., None]]:
     """Show a bar for each law, of `runs` runs, and for each search for a worst case, with the rate and the time left; yield
-    the function to call with a law and how many more of its runs are done, or also with what is `Sought`, from any thread.
-    If an error comes before the first run, the bars disappear. drawn: whether runs differ in more than their noise."""
+    the function to call, from any thread, with a law and the number of further runs done, in a search also with its
+    `Sought`. If an error occurs before the first run, the bars disappear. drawn: whether anything is dispersed."""
     titles = [f"{counted(runs, 'run')} of {counted(len(laws), 'law')}"]
     if not drawn:
-        titles[0] += "; nothing is dispersed, so runs differ in their noise alone, if they have any"
+        titles[0] += "; nothing is dispersed, so runs differ only in their noise, if any"
     bars = bars_with("runs", Rate(), TimeLeft())
     tasks: dict[Any, TaskID] = {}
     for law in laws:
@@ -74,7 +74,7 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
 
 
 def print_campaign(result: CampaignResult, body: str) -> None:
-    """Print the outcome of a campaign on the body of this name: a summary of each law, verdicts, metrics, drivers, worst
+    """Print the outcome of a campaign on the body of this name: a summary of each law, verdicts, metrics, drivers and worst
     runs."""
     words = Wording.of(body, result)
     console.print()

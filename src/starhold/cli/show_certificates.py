@@ -1,4 +1,4 @@
-"""Tables of certificates, as `certify`, `check` and `compare` print them."""
+"""Prints certificates for `certify`, `check` and `compare`."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 LONGEST = 1_000
-"""The most characters of a text from a file that are printed."""
+"""The largest number of characters printed of a text from a file."""
 
 
 def print_certificate(tried: Tried, why: bool = False) -> None:
-    """Print claims with their outcomes, those that leave out the fewest parts of the loop first, each list of such parts
-    once, and why a claim is not proved. why: also how each was shown, and all assumptions."""
+    """Print claims with their outcomes, beginning with those that leave out the fewest parts of the loop, each list of such
+    parts once, and the reason why a claim is not proved. why: whether to print methods and all assumptions too."""
     certificate, trial, inside = tried
     subject = certificate.subject
     console.print(f"[bold]{_safe(certificate.name)}[/bold]: {coloured(certificate.outcome)}")
@@ -77,7 +77,7 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
 
 
 def print_chain(name: str, links: Sequence[Link]) -> None:
-    """Print of each switch between the modes of a law whether what is proved of the next one as it flies begins there."""
+    """Print for each switch between the modes of a law whether the claim about the next mode as it flies covers it."""
     console.print(f"[bold]{_safe(name)}[/bold]: {summary(links)}:")
     table = _grid()
     for link in links:
@@ -90,7 +90,7 @@ def print_chain(name: str, links: Sequence[Link]) -> None:
 
 
 def print_proved(flights: Sequence[Flight]) -> None:
-    """Print of each law whether anything is proved of the loop as it flies, the claim that leaves out the least, the names
+    """Print for each law whether there is a claim about the loop as it flies, the claim that leaves out the least, the names
     of the others, and how long they cover a flight."""
     console.print("\nCertified on this spacecraft (for details: starhold certify --why):")
     table = _grid()
@@ -102,7 +102,7 @@ def print_proved(flights: Sequence[Flight]) -> None:
 
 
 def _grid() -> Table:
-    """A table of three columns without lines."""
+    """Return a table of three columns without lines."""
     table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
     for _ in range(3):
         table.add_column(overflow="fold")
@@ -110,8 +110,8 @@ def _grid() -> Table:
 
 
 def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[tuple[str, str, str]]:
-    """At most four rows about a certificate: why no claim is about the loop as it flies, its first claim, the names of the
-    others, and the bounds of the flight."""
+    """Yield at most four rows about a certificate: the reason if no claim is about the loop as it flies, its first claim,
+    the names of the others, and the time for which they cover the flight."""
     claims, name, (word, said) = ranked(certificate), certificate.name, unflown_text(certificate)
     if said:
         yield name, coloured(word), said
@@ -127,7 +127,7 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
         named.setdefault(claim.outcome, []).append(HEADINGS[claim.kind])
     if others:
         yield "", "[dim]and[/dim]", "; ".join(f"{outcome}: {', '.join(kinds)}" for outcome, kinds in named.items())
-    # Of claims that are left together, the reasons of the one shown first are given.
+    # If a flight leaves several claims at once, the reasons are those of the claim shown first.
     proved = [claim.kind for claim in strongest(claims) if claim.outcome == "proved"]
     departures = flight.departures[place] if flight.departures else {}
     begins = {kind: departures[kind] for kind in proved if kind in departures}
@@ -139,18 +139,18 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
 
 
 def _uncovered(flight: Flight, left: Sequence[Departure]) -> str:
-    """Say from when on no claim covers a flight, and why; parts that claims leave out are not named again."""
+    """Return a sentence on when and why claims cease to cover a flight; parts that claims leave out are not named again."""
     time = left[0].time
     happens = [one.how for one in left if one.time == time]
     events = [how for how in happens if not how.startswith(HAS)]
     if len(events) < len(happens):
         events.insert(0, "its loop has parts in no claim")
     begin = "from the start" if time == 0.0 else f"from {flight.metric_set.moment(time, 4)} on"
-    return f"{begin} nothing proved covers this flight: {listed(events)}"
+    return f"{begin} no proved claim covers this flight: {listed(events)}"
 
 
 def assumptions(certificate: Certificate) -> str:
-    """List every assumption once, with the claims that need it unless all do."""
+    """Return every assumption once, with the claims that need it unless all do."""
     kinds = {claim.kind: texts(claim.assumptions) for claim in certificate.claims}
     parts: list[str] = []
     for assumption in dict.fromkeys(a for assumed in kinds.values() for a in assumed):
@@ -166,7 +166,7 @@ def assumptions(certificate: Certificate) -> str:
 
 
 def print_compared(others: Sequence[str], scenario: str | None) -> None:
-    """Print whether the proofs are about the loops of a scenario; None: they were compared with none."""
+    """Print whether the proofs are about the loops of a scenario; None: they were not compared."""
     if scenario is None:
         console.print("The programs of its proofs were not compared with those of a scenario.")
     elif not others:

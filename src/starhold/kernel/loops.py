@@ -34,6 +34,8 @@ HANDED = "handed over"
 """The loop takes over from another one in any of the states that the claim says its set holds."""
 IS_VALID = "measurement.is_valid"
 """This input tells a program whether the estimate that it is given is valid, as it is in every loop here."""
+TOLD_TORQUE = "measurement.external_torque"
+"""The torque from outside that a law is told."""
 NONE = [Poly({})] * 3
 Matrix: TypeAlias = Sequence[Sequence[Poly | Fraction]]
 Wired: TypeAlias = Mapping[str, Poly]
@@ -175,6 +177,12 @@ class AttitudeLoop(Loop):
         return "sign-at-once" if self.signs else "quaternion-as-fed"
 
     @property
+    def untold(self) -> list[str]:
+        """Return what is assumed of a law that reads a torque from outside in a loop that has none."""
+        reads = any(name.startswith(f"{TOLD_TORQUE}.") for name in self.claim.programs["law"].inputs)
+        return ["untold-torque"] * (reads and not self.outside)
+
+    @property
     def divisors(self) -> dict[str, Poly]:
         """Return the polynomials that variables are inverses of."""
         return {name: Poly(dict(terms)) for terms, name in self.ring.inverses.items()}
@@ -293,4 +301,4 @@ def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:
 
 def slopes(parts: Sequence[Poly], names: Sequence[str], at: Mapping[str, Poly | Fraction | int] | None = None) -> Rows:
     """Return the derivatives with respect to variables, at a point where one is told."""
-    return [[p.slope(name).at(at or {}).number for name in names] for p in parts]
+    return [[(one.at(at) if at else one).number for one in map(p.slope, names)] for p in parts]

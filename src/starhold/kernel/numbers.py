@@ -185,7 +185,8 @@ def times(a: Rows, b: Rows) -> Rows:
 
 def plus(a: Rows, b: Rows, c: Fraction | int = 1) -> Rows:
     """Return a + c b."""
-    return [[x + c * y if y else x for x, y in zip(s, t, strict=True)] for s, t in zip(a, b, strict=True)]
+    more = b if c == 1 else [[c * y if y else y for y in row] for row in b]
+    return [[x + y if y else x for x, y in zip(s, t, strict=True)] for s, t in zip(a, more, strict=True)]
 
 
 def transpose(a: Sequence[Sequence[Fraction]]) -> Rows:

@@ -15,7 +15,7 @@ from .numbers import Account, demand, rational, read_dict, up, whole
 Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
 
-DEGREE, TERMS = 24, 100_000
+DEGREE, TERMS, ZERO = 24, 100_000, Fraction(0)
 
 
 class Poly:
@@ -173,7 +173,7 @@ def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
 def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
     """Return a number that |p| does not exceed where no variable exceeds its size."""
     if not p.upper:
-        return Fraction(0)
+        return ZERO
     names = [*p.names]
     numbers, lower = whole([sizes[name] for name in names])
     ratios, bits = dict(zip(names, numbers, strict=True)), max(map(int.bit_length, (lower, *numbers)))

@@ -106,9 +106,10 @@ def least_form(parts: Factored, region: Region) -> Rows:
 
 def outweighed(Q: Rows, c: Fraction, F: Rows, M: Rows) -> Rows:
     """Return the matrix of a form that is no more than x.Qx - c |Fx| |Mx|: 2 |Fx| |Mx| <= s |Fx|^2 + |Mx|^2 / s."""
-    if not c:
+    large, small = stretch(M), stretch(F)
+    if not c * large * small:
         return Q
-    s = stretch(M) / stretch(F)
+    s = large / small
     return plus(plus(Q, times(transpose(F), F), -c * s / 2), times(transpose(M), M), -c / (2 * s))
 
 

@@ -21,6 +21,7 @@ ASSUMPTIONS = {
     "known-outside-torque": "a torque from outside is as the law is told",
     "bounded-outside-torque": "a torque from outside is at most as told",
     "changing-outside-torque": "a torque from outside is told as at the attitude told, and changes no faster than told",
+    "untold-torque": "the law is told of no torque from outside",
     "bounded-push": "torques from outside and errors of the command are no larger than told",
     "held-torque": "the torque is what the law asks for at the last sample, and the error",
     "best-plan": "the law's torque is of a plan as told, for the given inertia and motion linearised about the rate told",

@@ -1,4 +1,4 @@
-"""The scenarios, flights, figures and proofs for measures; each is made once for a publication."""
+"""The scenarios, flights, figures and proofs that measures use; each is made once per publication."""
 
 import shutil
 import tempfile
@@ -20,13 +20,13 @@ from starhold.studies.flight import Flight
 
 
 class Desk:
-    """The scenarios of one publication by name: its own files first, then the built-in ones; `changes` are those of a
-    scenario's `with_`."""
+    """The scenarios of one publication by name: its own files first, then the built-in ones; `changes` are as for
+    `Scenario.with_`."""
 
     def __init__(self, letter: str) -> None:
         self.letter = letter
         self.used: dict[str, str] = {}
-        """The texts of the scenario files used so far."""
+        """The texts of the scenario files used so far, by name."""
         self._made: dict[Any, Any] = {}
 
     @cached_property
@@ -40,14 +40,14 @@ class Desk:
         return Path(folder)
 
     def once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """Return the result of `make`, which is called at the first request for this key."""
+        """Return the result of `make`, which is called only at the first request for this key."""
         name = repr(key)
         if name not in self._made:
             self._made[name] = make()
         return self._made[name]
 
     def scenario(self, file: str, changes: Mapping[str, Any] | None = None) -> Scenario:
-        """A scenario, with changes."""
+        """Return a scenario with changes."""
 
         def make() -> Scenario:
             text = self._files[file] if file in self._files else builtin_text(file)
@@ -58,7 +58,7 @@ class Desk:
         return self.once(("scenario", file, changes), make)
 
     def flight(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> Flight:
-        """A law's flight, measured."""
+        """Return a law's flight with its metrics."""
 
         def make() -> Flight:
             scenario = self.scenario(file, changes)
@@ -67,26 +67,26 @@ class Desk:
         return self.once(("flight", file, law, changes), make)
 
     def loop(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> ClosedLoop:
-        """A law's closed loop."""
+        """Return a law's closed loop."""
         scenario = self.scenario(file, changes)
         return studies.build(scenario, scenario.pick(law))
 
     def recording(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> Recording:
-        """The recording of a law's flight."""
+        """Return the recording of a law's flight."""
         return self.flight(file, law, changes).recording
 
     def certificates(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> Sequence[Issued]:
-        """The certificates of a law, that of the flight's start first, not tried by flights."""
+        """Return the certificates of a law, beginning with that of the initial loop, not tested by flights."""
         scenario = self.scenario(file, changes)
         certify, loop = study_of(scenario.body).certify, self.loop(file, law, changes)
         return self.once(("certificates", file, law, changes), lambda: certify(scenario, scenario.pick(law), loop))
 
     def claims(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> dict[str, Claim]:
-        """Return the claims about a law as the flight starts, by their kinds."""
+        """Return the claims about a law's initial loop, by kind."""
         return {claim.kind: claim for claim in self.certificates(file, law, changes)[0].certificate.claims}
 
     def campaign(self, file: str) -> CampaignResult:
-        """The campaign of a scenario file, its store in a folder that goes with this desk."""
+        """Return the campaign of a scenario file, stored in a folder that is removed with this desk."""
 
         def make() -> CampaignResult:
             from starhold.campaign.campaign import Options, fly_campaign

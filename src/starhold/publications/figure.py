@@ -1,4 +1,4 @@
-"""A figure as data: its curves, not the drawing of them."""
+"""Figures as data: curves and panels, without the drawing."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ Style: TypeAlias = Literal["line", "dashed", "dotted", "points", "steps", "area"
 
 @dataclass(frozen=True)
 class Curve:
-    """Points that belong together: x (n,) and y (n,), in the units of the panel's labels. An "area" is a closed outline
-    that is filled; "faint" is a thin grey line."""
+    """A curve: x (n,) and y (n,), in the units of the panel's labels. An "area" is a closed, filled outline; "faint" is a
+    thin grey line."""
 
     x: Any
     y: Any
     label: str = ""
     style: Style = "line"
     hue: int | None = None
-    """The number of its colour; its place in the panel if None. Curves of one hue look alike."""
+    """The number of its colour, by default its index in the panel. Curves of one hue look alike."""
 
     @classmethod
     def along(cls, points: Any, label: str = "", style: Style = "line", hue: int | None = None) -> Curve:
-        """The curve through points (2, n)."""
+        """Return the curve through points (2, n)."""
         x, y = points
         return cls(x, y, label, style, hue)
 
@@ -41,7 +41,7 @@ class Panel:
     log_x: bool = False
     log_y: bool = False
     equal: bool = False
-    """Whether a unit is as long on both axes."""
+    """Whether both axes have the same scale."""
     levels: Sequence[float] = ()
     notes: Sequence[tuple[float, float, str]] = ()
     """Labels at points (x, y)."""

@@ -1,4 +1,4 @@
-"""Measures that several publications share."""
+"""Measures shared by several publications."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,13 +13,13 @@ from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding
 
 CLOCKS = {"s": 1.0, "min": 60.0}
-"""Units of time of a figure (s)."""
+"""Units of time in figures, in seconds."""
 
 
 def metric(
     desk: Desk, file: str, law: str, name: str, scale: float = 1.0, changes: Mapping[str, Any] | None = None
 ) -> Finding:
-    """A metric of a flight, as `compare` reports it (SI), times a scale; not a number where the flight has none."""
+    """Return a metric of a flight, as `compare` reports it (SI), times a scale; NaN where the flight has no such value."""
     value = desk.flight(file, law, changes).metrics.get(name)
     return Finding(float("nan") if value is None else scale * float(value))
 
@@ -33,7 +33,7 @@ def proved(desk: Desk, file: str, law: str, claim: str) -> Finding:
 def samples(
     desk: Desk, file: str, law: str, quantity: str, until: float = math.inf, changes: Mapping[str, Any] | None = None
 ) -> tuple[Any, Any]:
-    """The times (n,) of a flight up to one (the recording's unit of time), and a recorded quantity (n, ...) at these."""
+    """Return the times (n,) of a flight up to `until` (the recording's unit of time) and a quantity (n, ...) at these."""
     recording = desk.recording(file, law, changes)
     shown = np.asarray(recording["time"]) <= until
     return np.asarray(recording["time"])[shown], np.asarray(recording[quantity])[shown]
@@ -51,7 +51,7 @@ def history(
     until: float = math.inf,
     changes: Mapping[str, Any] | None = None,
 ) -> Figure:
-    """Components of a recorded quantity over the time of a flight, up to `until` (the recording's unit of time)."""
+    """Return a figure of components of a recorded quantity over time, up to `until` (the recording's unit of time)."""
     time, values = samples(desk, file, law, quantity, until, changes)
     columns = values.reshape(len(values), -1)
     curves = [
@@ -64,7 +64,7 @@ def history(
 def histories(
     desk: Desk, runs: Sequence[tuple[str, str]], until: float, clock: str = "s", levels: Sequence[float] = (), **what: Any
 ) -> Figure:
-    """Draw a panel as `history` does for each of several flights, values held from sample to sample, with these levels."""
+    """Return a figure with a panel as in `history` per flight, values held between samples, with these levels."""
     figures = {law: history(desk, file, law, until=until, **what) for file, law in runs}
     panels: list[Panel] = []
     for law, figure in figures.items():
@@ -76,7 +76,7 @@ def histories(
 def angles(
     desk: Desk, runs: Mapping[str, Sequence[str]], until: float = math.inf, clock: str = "s", log: bool = False
 ) -> Figure:
-    """The angle of rotation from the target over time, of several flights: file and law by their names."""
+    """Return a figure of the angle from the target over time for several flights, given by name as file and law."""
     curves: list[Curve] = []
     for name, (file, law) in runs.items():
         time, error = samples(desk, file, law, "attitude_error", until)
@@ -85,8 +85,8 @@ def angles(
 
 
 def bounded(desk: Desk, of: Mapping[str, Sequence[Any]], name: str, at_most: float = math.inf, unit: str = "") -> Finding:
-    """Tell for several flights, by names file, law and perhaps changes, whether a metric (SI) exists and is at most so
-    large."""
+    """Return for several flights, given by name as file, law and changes if any, whether a metric (SI) exists and is at most
+    `at_most`."""
     values = {case: desk.flight(*flight).metrics[name] for case, flight in of.items()}
     shown = ", ".join(f"{case} {'none' if value is None else f'{value:.3g}'}" for case, value in values.items())
     return Finding(

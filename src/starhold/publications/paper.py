@@ -1,4 +1,4 @@
-"""`paper.toml` says what a publication prints, item by item, and who measures it."""
+"""Reads `paper.toml`, which lists what a publication prints, item by item, and the measure of each item."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class _Strict(BaseModel):
 
 
 class Item(_Strict):
-    """An item made by a measure: the function's name, from a module in the paper's folder or a common one, and its arguments
-    beside the desk."""
+    """An item made by a measure: the name of the function, in a module of the paper's folder or in the common one, and its
+    arguments besides the desk."""
 
     by: str
     given: dict[str, Any] = Field(default_factory=dict, alias="with")
 
 
 class FigureItem(Item):
-    """A figure: its number in the publication ("" for one of ours), its caption, and the point to see in it."""
+    """A figure: its number in the publication ("" for an additional one), its caption, and the point that it shows."""
 
     number: str = ""
     name: str
@@ -35,7 +35,7 @@ class FigureItem(Item):
     caption: str
     seen: str = ""
     after: str = ""
-    """The number of the figure that one of ours follows."""
+    """The number of the published figure after which an additional one comes."""
 
 
 class Row(Item):
@@ -46,16 +46,16 @@ class Row(Item):
     """Its place in the publication: a section, equation, figure or table."""
     says: str
     published: tuple[str, ...] = ()
-    """The printed numbers, with all their digits; none where a statement is judged."""
+    """The printed numbers, with all their digits; empty where a statement is judged."""
     unit: str = ""
     tolerance: float = 0.0
-    """The relative difference from the printed number within which ours counts as close."""
+    """The relative difference from the printed number up to which ours counts as close."""
     verdict: Verdict
-    """The verdict that is expected."""
+    """The expected verdict."""
     why: str = ""
     """The explanation of a verdict other than agreement."""
     erratum: int | None = None
-    """The erratum's number, of a row that shows one."""
+    """The number of the erratum that the row shows, if any."""
 
     @field_validator("published", mode="before")
     @classmethod
@@ -65,7 +65,7 @@ class Row(Item):
     @model_validator(mode="after")
     def _explained(self) -> Row:
         if self.verdict not in PLAIN and not self.why:
-            raise ValueError(f"{self.name}: a verdict of {self.verdict!r} wants a `why`")
+            raise ValueError(f"{self.name}: a verdict of {self.verdict!r} needs a `why`")
         numbers = ("agrees", "close", "differs")
         if (self.verdict in numbers) != bool(self.published):
             raise ValueError(f"{self.name}: {self.verdict!r} goes with {'no' if self.published else 'a'} printed number")
@@ -73,7 +73,7 @@ class Row(Item):
 
     @property
     def printed(self) -> list[Printed]:
-        """The printed numbers, read."""
+        """The printed numbers in parsed form."""
         return [Printed.read(text) for text in self.published]
 
 
@@ -115,12 +115,12 @@ class Paper(_Strict):
 
 
 def papers_of(word: str) -> list[str]:
-    """The letters that a word on the command line means. InputError for anything but a letter or "all"."""
+    """Return the letters that a word on the command line stands for. InputError unless it is a letter or "all"."""
     return list(PAPERS) if word.lower() == "all" else [paper_of(word, " or all")]
 
 
 def paper_of(word: str, or_else: str = "") -> str:
-    """The letter of a publication, in capitals. InputError for anything else, naming the words allowed."""
+    """Return the letter of a publication, in upper case. InputError, which lists the allowed words, for anything else."""
     expect(word, str, "reproduce", f"{', '.join(PAPERS)}{or_else}")
     if word.upper() not in PAPERS:
         raise InputError("reproduce", "publication", word, f"{', '.join(PAPERS)}{or_else}")
@@ -128,17 +128,17 @@ def paper_of(word: str, or_else: str = "") -> str:
 
 
 def folder_of(letter: str) -> Any:
-    """The folder of a publication."""
+    """Return the folder of a publication."""
     return resources.files("starhold.publications.papers") / letter
 
 
 def read_paper(letter: str) -> Paper:
-    """The publication of a letter."""
+    """Return the publication of a letter."""
     return Paper.model_validate(tomllib.loads((folder_of(letter) / "paper.toml").read_text(encoding="utf-8")))
 
 
 def scenario_files(letter: str) -> dict[str, str]:
-    """The scenario files of a publication, by their names without the ending."""
+    """Return the texts of a publication's scenario files, by their names without suffix."""
     files = {item.name: item for item in folder_of(letter).iterdir() if item.name.endswith(".toml")}
     return {
         name.removesuffix(".toml"): files[name].read_text(encoding="utf-8") for name in sorted(files) if name != "paper.toml"

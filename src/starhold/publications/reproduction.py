@@ -1,4 +1,4 @@
-"""Makes every figure of a publication, and gives every row a verdict."""
+"""Reproduces every figure of a publication and gives every row a verdict."""
 
 import time
 from collections.abc import Callable
@@ -28,7 +28,7 @@ class Judged:
         return self.verdict != self.row.verdict
 
     def summary(self) -> dict[str, Any]:
-        """The row for `summary.json`."""
+        """Return the row for `summary.json`."""
         value = self.finding.value
         ours = value if isinstance(value, (bool, dict)) else [value] if isinstance(value, (int, float)) else list(value)
         row = self.row
@@ -48,8 +48,8 @@ class Judged:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A publication made again: its figures by name, its rows with verdicts by name, the texts of the scenario files that
-    were flown, and the seconds it took."""
+    """A reproduced publication: its figures by name, its rows with verdicts by name, the texts of the flown scenario files,
+    and the time (s) it took."""
 
     paper: Paper
     figures: dict[str, Figure]
@@ -64,15 +64,15 @@ class Reproduction:
 
 
 def measure_of(letter: str, item: Item) -> Callable[..., Any]:
-    """The function that makes an item: of a module of the publication, else a common one. AttributeError where there is
-    none."""
+    """Return the function that makes an item, from a module of the publication or else the common one. AttributeError where
+    there is none."""
     package = import_module(f"starhold.publications.papers.{letter}")
     modules = (import_module(f"{package.__name__}.{module.name}") for module in iter_modules(package.__path__))
     return getattr(next((module for module in modules if hasattr(module, item.by)), common), item.by)
 
 
 def reproduce(letter: str, notice: Callable[[int, int], None] | None = None) -> Reproduction:
-    """Make a publication's figures and rows. The notice is called with the items done and those in all."""
+    """Return a publication's figures and rows. notice: called with the number of items done and the total."""
     begun, paper, desk = time.perf_counter(), read_paper(letter), Desk(letter)
     figures: dict[str, Figure] = {}
     rows: dict[str, Judged] = {}

@@ -1,5 +1,5 @@
-"""A verdict says how a measurement compares with a printed number or statement. It is computed; the expected one is
-written down, so that a change shows."""
+"""Verdicts on how a measurement compares with a printed number or statement. They are computed; the expected ones are
+recorded, so that a change is noticed."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from typing import Literal, TypeAlias
 Verdict: TypeAlias = Literal["agrees", "close", "differs", "holds", "depends", "fails"]
 VERDICTS: dict[Verdict, str] = {
     "agrees": "our number, rounded to the printed digits, is the printed one, or it lies beyond the printed bound",
-    "close": "it does not round to the printed digits, but lies within the tolerance that the row states",
-    "differs": "it lies outside that tolerance",
+    "close": "our number does not round to the printed digits, but lies within the tolerance that the row states",
+    "differs": "our number lies outside that tolerance",
     "holds": "the statement is true in every case that was tried or proved",
     "depends": "the statement is true for some of the choices that the publication leaves open, and false for others",
     "fails": "the statement is false in every case",
 }
 PLAIN: tuple[Verdict, ...] = ("agrees", "holds")
-"""Verdicts that need no explanation."""
+"""The verdicts that need no explanation."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A measurement is a number (or one for each that is printed), or whether a statement is true: of all, or by the
-    names of choices. The note describes it in a few words."""
+    """A measurement: a number (or one for each printed number), or whether a statement is true, in general or by the names
+    of choices. The note describes it briefly."""
 
     value: float | Sequence[float] | bool | dict[str, bool]
     note: str = ""
@@ -33,14 +33,14 @@ class Finding:
 
 @dataclass(frozen=True)
 class Printed:
-    """A number as it is printed: its digits, and whether it is a bound that the true value lies beyond."""
+    """A printed number: its digits, and whether it is a bound beyond which the true value lies."""
 
     text: str
     bound: str = ""
 
     @classmethod
     def read(cls, text: str) -> Printed:
-        """Read "22.8", "1.2e-6", "> 3000" or "< 0.1". ValueError for anything else."""
+        """Return the number in "22.8", "1.2e-6", "> 3000" or "< 0.1". ValueError for anything else."""
         stripped = text.strip()
         bound = stripped[0] if stripped[:1] in ("<", ">") else ""
         digits = stripped.removeprefix(bound).strip()
@@ -54,7 +54,7 @@ class Printed:
         return float(self.text)
 
     def rounds_from(self, ours: float) -> bool:
-        """Return whether a number rounds to the printed digits, a half either way."""
+        """Return whether a number rounds to the printed digits; a half may round either way."""
         if not math.isfinite(ours):
             return False
         exponent = Decimal(self.text).as_tuple().exponent
@@ -63,7 +63,7 @@ class Printed:
         return abs(Decimal(ours) - Decimal(self.text)) <= half
 
     def judge(self, ours: float, tolerance: float) -> Verdict:
-        """The verdict on a number; the tolerance is a share of the printed one."""
+        """Return the verdict on a number; the tolerance is a share of the printed number."""
         if self.bound:
             beyond = ours > self.value if self.bound == ">" else ours < self.value
             return "agrees" if beyond else "differs"
@@ -73,8 +73,8 @@ class Printed:
 
 
 def judge(finding: Finding, printed: Sequence[Printed], tolerance: float) -> Verdict:
-    """The verdict on a finding; that of several numbers is the worst of theirs. ValueError where the finding and the printed
-    value are of different kinds."""
+    """Return the verdict on a finding; for several numbers, the worst of their verdicts. ValueError where the finding and
+    the printed value are of different kinds."""
     value = finding.value
     if isinstance(value, dict):
         if printed or not value:

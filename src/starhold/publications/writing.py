@@ -1,4 +1,4 @@
-"""Writes a reproduction: a page and a folder of scenario files a publication, an index and `summary.json`."""
+"""Writes reproductions: a page and a folder of scenario files per publication, an index and `summary.json`."""
 
 import json
 from collections import Counter
@@ -23,7 +23,7 @@ from starhold.version import __version__
 
 
 def paper_page(made: Reproduction, pictures: Mapping[str, bytes]) -> str:
-    """The page of a publication, with its pictures (PNG) by the names of their figures."""
+    """Return the page of a publication, with its pictures (PNG) by the names of their figures."""
     paper = made.paper
     body = [
         f'<header class="top"><h1>{escape(paper.letter)}. {escape(paper.title)}</h1>{tally(made.rows.values())}</header>',
@@ -39,7 +39,7 @@ def paper_page(made: Reproduction, pictures: Mapping[str, bytes]) -> str:
 
 
 def index_page(made: Sequence[Reproduction]) -> str:
-    """The page that leads to those of the publications, with all errata."""
+    """Return the page with links to those of the publications, and all errata."""
     rows = [
         [
             Markup(
@@ -67,14 +67,14 @@ def index_page(made: Sequence[Reproduction]) -> str:
 
 
 def tally(rows: Any) -> str:
-    """The count of each verdict."""
+    """Return the count of each verdict in words."""
     counted = Counter(judged.verdict for judged in rows)
     given = [verdict for verdict in VERDICTS if counted[verdict]]
     return " ".join(f'<span class="count">{pill(verdict)} {counted[verdict]}</span>' for verdict in given)
 
 
 def value_words(judged: Judged) -> str:
-    """The measured value, in words."""
+    """Return the measured value in words."""
     value, unit = judged.finding.value, judged.row.unit
     if isinstance(value, dict):
         yes = [name for name, true in value.items() if true]
@@ -88,7 +88,8 @@ def value_words(judged: Judged) -> str:
 
 
 def difference(judged: Judged) -> str:
-    """Our value less the printed, as a share of it, or their ratio if far apart; "" for bounds and statements."""
+    """Return our value minus the printed one, as a share of it, or their ratio if far apart; "" for bounds and
+    statements."""
     value = judged.finding.value
     if isinstance(value, (bool, dict)):
         return ""
@@ -132,7 +133,7 @@ def _table(rows: Sequence[Judged]) -> str:
 
 
 def _row(judged: Judged, numbers: bool) -> list[Any]:
-    """A row of a table, with what is to be explained; with the columns of printed numbers or without."""
+    """Return a row of a table with its explanation, with or without the columns of printed numbers."""
     row = judged.row
     mark = f"Erratum {row.erratum}. " if row.erratum is not None else ""
     printed = ", ".join(row.published) + (f" {row.unit}" if row.unit and row.published else "")
@@ -207,7 +208,7 @@ WIDTH = 8.0
 
 
 def draw(figure: Figure) -> bytes:
-    """The figure as a PNG file."""
+    """Return the figure as the bytes of a PNG file."""
     from matplotlib.figure import Figure as Canvas
 
     columns = min(figure.columns, len(figure.panels))
@@ -219,7 +220,7 @@ def draw(figure: Figure) -> bytes:
     for axis, panel in zip(axes, figure.panels, strict=False):
         _panel(axis, panel)
         if columns > 2 and not panel.log_x:
-            # In a narrow panel more numbers would run into one another.
+            # In a narrow panel more numbers would overlap.
             axis.locator_params(axis="x", nbins=4)
     for axis in axes[len(figure.panels) :]:
         axis.set_visible(False)
@@ -276,7 +277,7 @@ def _curve(axis: Any, curve: Curve, hue: str) -> None:
 
 
 def write_paper(letter: str, folder: Path, notice: Callable[[int, int], None] | None = None) -> Reproduction:
-    """Make a publication and write its page and its files into `folder`, which exists."""
+    """Reproduce a publication, write its page and files into `folder`, which exists, and return it."""
     made = reproduce(letter, notice)
     write_text(folder / f"{letter}.html", paper_page(made, {name: draw(figure) for name, figure in made.figures.items()}))
     (folder / letter).mkdir(exist_ok=True)

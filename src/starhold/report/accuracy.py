@@ -1,4 +1,4 @@
-"""Control steps to an accuracy, as a figure; what draws it needs nothing else of a body."""
+"""The figure of control steps needed to reach each accuracy, drawn without other modules of the body."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +13,8 @@ from starhold.studies.flight import Flight
 def draw_accuracy(
     columns: Mapping[str, Sequence[Sequence[int | None]]], decades: Sequence[int], flights: Sequence[Flight], name: str
 ) -> Any:
-    """Draw for each heading the steps of each flight after which an error stays within 10^-k, for every k of `decades`."""
+    """Return a figure with, for each heading, the steps of each flight after which an error stays within 10^-k, for every k
+    of `decades`."""
     figure, axes = blank(1, 2, 3.9, "control steps needed to stay within 10⁻ᵏ", flights, name, "")
     for axis, (label, counts) in zip(axes, columns.items(), strict=True):
         for number, count in enumerate(counts):

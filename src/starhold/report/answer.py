@@ -1,4 +1,4 @@
-"""The first screen of a page: whether each law meets its requirements, by how much, and what of that is proved."""
+"""The first screen of a page: whether and with what margin each law meets its requirements, and what is proved about it."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from starhold.studies.verification import RequirementVerdict
 
 SPANS = ((63_115_200.0, 31_557_600.0, "years"), (172_800.0, 86_400.0, "days"), (7_200.0, 3_600.0, "h"), (600.0, 60.0, "min"))
-"""The least time (s) that is shown in each unit, and the unit in seconds."""
+"""The least time (s) shown in each unit, the unit in seconds, and its name."""
 
 
 def span_text(seconds: float) -> str:
-    """Show a time in the unit in which it is large and round."""
+    """Return a time (s) as text, in the largest suitable unit."""
     sizes = ((seconds / size, unit) for least, size, unit in SPANS if seconds >= least)
     return "{:g} {}".format(*next((one for one in sizes if abs(one[0] - round(one[0], 2)) < 1e-9), (seconds, "s")))
 
 
 def facts(scenario: Scenario, flights: Sequence[Flight]) -> str:
-    """State the duration of the flights and the control rate."""
+    """Return a text with the duration of the flights and the control rate."""
     run = flights[0].recording.attrs
     period, end = (x * run.get("time_unit_s", 1.0) for x in (run["control_period"], scenario.table.simulation.duration))
     whose = f", commands from {run['law_process']}" if "law_process" in run else ""
@@ -41,7 +41,7 @@ def facts(scenario: Scenario, flights: Sequence[Flight]) -> str:
 
 
 def lost_alarm(flights: Sequence[Flight]) -> str:
-    """List the motions that diverged and the metrics that are not finite; empty if there are none."""
+    """Return HTML that lists the motions that diverged and the metrics that are not finite; "" if there are none."""
     lost = [f"{flight.name} (at {lost_text(flight)})" for flight in flights if flight.lost is not None]
     sentences = [f"Diverged, and so without final values: {', '.join(lost)}"] if lost else []
     sentences += [said for flight in flights if (said := unknown_text(flight))]
@@ -49,7 +49,8 @@ def lost_alarm(flights: Sequence[Flight]) -> str:
 
 
 def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
-    """Make the table of requirements with the verdict on each law, and count verdicts; empty without requirements."""
+    """Return the table of requirements with the verdict on each law, and the counts of verdicts; both "" without
+    requirements."""
     names = {entry.name for entry in scenario.laws} if scenario.table.requirement else set[str]()
     judged = {number: verdicts_of_flight(scenario, one) for number, one in enumerate(flights) if one.name in names}
     if not judged:
@@ -77,7 +78,7 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
 
 
 def _evidence(verdict: RequirementVerdict, law: str) -> str:
-    """State how a verdict is known, without the law's name, so that equal texts of several laws appear once."""
+    """Return the evidence for a verdict, without the law's name, so that equal texts for several laws appear once."""
     known = verdict.evidence.replace(f" of {law}", "")
     return f"{known}; leaving out {', '.join(verdict.left_out)}" if verdict.left_out else known
 
@@ -90,13 +91,13 @@ def _counted(given: Sequence[RequirementVerdict]) -> str:
 
 
 def key_metrics(metric_set: MetricSet, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """List the metrics of the table, beginning with those by which laws are ranked."""
+    """Return the names of the metrics in the table, beginning with those by which laws are ranked."""
     there = metric_set.columns(results)
     return [*(name for name in metric_set.order if name in there), *(name for name in there if name not in metric_set.order)]
 
 
 def fate(flight: Flight) -> str:
-    """State the outcome of a flight in a word; empty where no metric says whether it settles."""
+    """Return the outcome of a flight in a word; "" where no metric states whether it settles."""
     if flight.lost is not None:
         return "diverged"
     if "settling_time" not in flight.metrics:
@@ -105,7 +106,7 @@ def fate(flight: Flight) -> str:
 
 
 def ranking(flights: Sequence[Flight]) -> str:
-    """Make the ranked table: a row of key numbers for each law, and below it the best law by each metric."""
+    """Return the ranked table as HTML: a row of key numbers for each law, and below it the best law by each metric."""
     metric_set = flights[0].metric_set
     results = {flight.name: flight.metrics for flight in flights}
     best, metrics = metric_set.winners(results), key_metrics(metric_set, results)
@@ -138,7 +139,7 @@ def _winners(names: Iterable[str], numbers: Mapping[str, int]) -> str:
 
 
 def columns_list(flights: Sequence[Flight]) -> str:
-    """Explain the columns of the ranking and its order."""
+    """Return HTML that explains the columns of the ranking and its order."""
     metric_set, results = flights[0].metric_set, {flight.name: flight.metrics for flight in flights}
     items = "".join(
         f"<dt>{escape(one.heading)}{f', {escape(one.unit)}' if one.unit else ''}</dt><dd>{escape(one.meaning)}</dd>"
@@ -152,8 +153,8 @@ def columns_list(flights: Sequence[Flight]) -> str:
 
 
 def proofs(flights: Sequence[Flight]) -> str:
-    """State the strongest proof about each law in a sentence, and before it why there is none about the loop as it flies;
-    empty where none was attempted."""
+    """Return HTML with the strongest claim proved about each law, preceded by the reason if there is none about the loop as
+    it flies; "" where no proof was attempted."""
     certified = [(number, flight) for number, flight in enumerate(flights) if flight.certificates]
     names = [f"<strong>{swatch(n)}{escape(one.name)}</strong> " if len(flights) > 1 else "" for n, one in certified]
     lines = [f"{_unflown(one, name)}{_strongest(one, name)}" for (_, one), name in zip(certified, names, strict=True)]

@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 ACCURACIES = (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10⁻ᵏ rad/s"))
-"""Errors whose steps to an accuracy are counted: the prefix of the metric, and the heading."""
+"""Errors for which the steps to an accuracy are counted: the prefix of the metric, and the heading."""
 MOST_MARKS = 20
-"""The most mode switches of a flight that are marked."""
+"""The largest number of mode switches marked per flight."""
 NEAR = 0.02
-"""The error is near the target below this share of its largest value."""
+"""A motion counts as near the target if its error is below this share of the largest value."""
 KNOWN = (*rigid_body.Sample._fields, *wheels.Sample._fields, "error_angle")
-"""Recorded quantities that have plots of their own."""
+"""Recorded quantities that have their own plots."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +61,13 @@ class AttitudePlots:
     """Rate and acceleration against their limits, momenta and torques of reaction wheels, where there are any, and what
     other parts record."""
     marks: tuple[Mark, ...] = ()
-    """When faults happen and are acted on, and modes begin (s)."""
+    """The times (s) of faults, of reactions to them, and of the beginnings of modes."""
     shaded: tuple[tuple[float, float], ...] = ()
-    """From when to when the estimate of a law is not valid (s)."""
+    """The intervals (s) in which the estimate of a law is not valid."""
 
 
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: float = math.inf) -> AttitudePlots:
-    """The plots of a comparison, each curve thinned to about `points` samples; marks up to `end` (s)."""
+    """Return the plots of a comparison, each curve thinned to about `points` samples, with marks up to `end` (s)."""
     longest = max((flight.recording["time"] for flight in flights), key=len)
     factor = thinning(len(longest), points)
 
@@ -103,7 +103,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
 
 
 def begun(flights: Sequence[Flight]) -> list[Mark]:
-    """List when modes begin; for laws that switch back and forth, the first few switches."""
+    """Return the times at which modes begin; for laws that switch back and forth, only the first few."""
     of = {flight.name: flight.modes for flight in flights if flight.modes}
     return [
         Mark(one.time, one.mode if len(of) == 1 else f"{name}: {one.mode}")
@@ -113,7 +113,7 @@ def begun(flights: Sequence[Flight]) -> list[Mark]:
 
 
 def unsure(flights: Sequence[Flight]) -> tuple[tuple[float, float], ...]:
-    """List from when to when (s) the estimate of a law is not valid; of one that goes to and fro, the first few times."""
+    """Return the intervals (s) in which the estimate of a law is not valid; if there are many, only the first few."""
     spans = dict[tuple[float, float], None]()
     for run in (flight.recording for flight in flights):
         name = column_of(run.arrays, run.attrs)
@@ -125,13 +125,13 @@ def unsure(flights: Sequence[Flight]) -> tuple[tuple[float, float], ...]:
 
 
 def readers_of(scenario: Scenario) -> tuple[str, ...]:
-    """List the prefixes of the names of quantities that sensors and estimators output."""
+    """Return the prefixes of the names of quantities that sensors and estimators output."""
     readers = [fitted.called for fitted in scenario.parts if fitted.part.role in ("sensor", "estimator")]
     return tuple(f"{name.replace('-', '_')}_" for name in readers)
 
 
 def steps_within(flight: Flight, kind: str) -> list[int | None]:
-    """Control steps after which the error stays within 10^-k, for every k of `DECADES`.
+    """Return the numbers of control steps after which the error stays within 10^-k, for every k of `DECADES`.
 
     kind: "" for the attitude, "rate_" for the rate."""
     return [flight.metrics.get(f"{kind}iterations_1e-{k}") for k in DECADES]
@@ -152,8 +152,8 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario) -> Plot:
 
 
 def funnel(flight: Flight) -> Iterator[tuple[Curve, Curve]]:
-    """Yield for each certificate times (s) and the angles (rad) that the flight is proved not to exceed from then on, while
-    the claim covers the flight."""
+    """Yield for each certificate times (s) and the proved bounds (rad) on the angle from then on, while the claim covers
+    the flight."""
     for certificate, every in zip(flight.certificates, flight.covered, strict=True):
         claim = certificate.claim("pointing")
         if claim is None:
@@ -174,8 +174,8 @@ def _roll_pitch_yaw(flights: Sequence[Flight], factor: int) -> Plot:
 
 
 def roll_pitch_yaw(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotations (deg) about the first, the new second and the new third axis that, from the last to the first,
-    make up each quaternion (n, 4); (n, 3). `algebra.cosines.to_angles` does the same for one."""
+    """Return roll, pitch and yaw (deg) of each quaternion (n, 4), an array (n, 3): Tait-Bryan (3-2-1) angles in reverse
+    order. `algebra.cosines.to_angles` does the same for one quaternion."""
     q0, q1, q2, q3 = q.T
     roll = np.arctan2(2.0 * (q2 * q3 + q0 * q1), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
     pitch = np.arcsin(np.clip(2.0 * (q0 * q2 - q1 * q3), -1.0, 1.0))
@@ -184,15 +184,15 @@ def roll_pitch_yaw(q: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _unwrapped(angles: Curve) -> Curve:
-    """Angles (deg) with gaps where they jump from one end of their range to the other."""
+    """Return angles (deg) with gaps where they jump from one end of their range to the other."""
     broken = angles.copy()
     broken[1:][np.abs(np.diff(angles)) > 180.0] = np.nan
     return broken
 
 
 def early(flights: Sequence[Flight]) -> float | None:
-    """Return the time (s), with a small margin, by which the motions that come near the target are near it; None where that
-    is most of the run, or where none does."""
+    """Return the time (s), with a small margin, by which all motions that come near the target have done so; None if it is
+    most of the run, or no motion does."""
     longest, ends = max(float(flight.recording["time"][-1]) for flight in flights), list[float]()
     for flight in flights:
         run = flight.recording
@@ -256,8 +256,8 @@ def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tuple
 
 
 def closest_limit(flight: Flight, scenario: Scenario) -> tuple[float, str]:
-    """Find the limit of torque or wheels to which a flight comes closest: its largest value as a share of the limit, and the
-    name of the limit; (0, "") where there is none."""
+    """Return, for the limit of torque or wheels to which a flight comes closest, the largest value as a share of the limit,
+    and the name of the limit; (0, "") if there is none."""
     run, wheels = flight.recording, wheels_of(scenario)
     torque, attrs = run["torque"], run.attrs
     limited = [("torque", np.linalg.norm(torque, axis=1) if attrs["limit"] == "norm" else torque, attrs["torque_limit"])]
@@ -279,7 +279,7 @@ def _rate_unit(flights: Sequence[Flight]) -> tuple[float, str]:
 
 
 def _limit(flights: Sequence[Flight], scenario: Scenario) -> tuple[tuple[float, ...], str]:
-    """The limit of the torque (N m) that binds first, and its name."""
+    """Return the torque limits (N m) that bind first, and their name."""
     attrs: dict[Any, Any] = flights[0].recording.attrs
     limit, kind = float(attrs["torque_limit"]), attrs["limit"]
     limit = math.inf if kind == "none" else limit
@@ -287,7 +287,7 @@ def _limit(flights: Sequence[Flight], scenario: Scenario) -> tuple[tuple[float, 
     sure = sure_torque(scenario.table, effectors_of(scenario))
     if sure < limit:
         norm = scenario.table.spacecraft.limit == "norm"
-        limit, words = sure, f"what the wheels surely give {'in norm' if norm else 'about each axis at once'}"
+        limit, words = sure, f"torque that the wheels always give {'in norm' if norm else 'about all axes at once'}"
         if any(fault.strikes_wheel for fault in scenario.table.fault):
             words += " before a fault"
     if not np.isfinite(limit):

@@ -14,8 +14,8 @@ LINE, LIMIT = {"color": "0.3", "linewidth": 1.0, "dashes": (5, 3)}, {"color": "#
 
 
 class Bars(NamedTuple):
-    """A panel: its label, the length of each bar and the text at its end, a dashed line; a title, and the required value,
-    drawn as a line unless it is too far away."""
+    """A panel: its label, the lengths of its bars and the texts at their ends, the position of a dashed line, a title, and
+    the required value, drawn as a line unless it is far outside the panel."""
 
     label: str
     values: Sequence[float]
@@ -37,11 +37,11 @@ def draw_bars(
     struck: Mapping[int, str] | None = None,
     why: str = "",
 ) -> Any:
-    """Draw a figure.
+    """Return a figure of bar charts.
 
-    note: text below the title. rows: their names; hues: the numbers of their colours, which `kinds` names in the legend.
-    dashed: the meaning of dashed lines. label: of the rows. struck: text in place of the bars of some rows, which `why`
-    explains."""
+    note: text below the title. rows: names of the rows; hues: the numbers of their colours, which `kinds` names in the
+    legend. dashed: the meaning of dashed lines. label: the label of the row axis. struck: texts in place of the bars of some
+    rows, which `why` explains in the legend."""
     from matplotlib.lines import Line2D
 
     struck = struck or {}

@@ -1,4 +1,4 @@
-"""The hooks through which reports show a body, and how they are found by the body's name."""
+"""The interface through which reports show a body, and its look-up by the body's name."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ if TYPE_CHECKING:
 
 
 class Sampling(NamedTuple):
-    """How plots are thinned: two of every `factor` samples are kept. early: samples of the transient where it is shown
-    alone, and their factor."""
+    """The thinning of plots: two of every `factor` samples are kept. early: the number of samples of the transient where it
+    is shown separately, and their factor."""
 
     factor: int
     early: tuple[int, int] | None = None
 
 
 class PageParts(NamedTuple):
-    """The parts of a page that are specific to the body: the data of its scripts (each plot in "plots" has a box, the first
-    on the first screen), HTML, and the names of scripts among the assets."""
+    """The parts of a page that are specific to the body: the data of its scripts (each plot in "plots" gets a box, the first
+    one on the first screen), HTML, and the names of scripts among the assets."""
 
     data: dict[str, Any]
     views: str = ""
@@ -31,7 +31,7 @@ class PageParts(NamedTuple):
     measured: str = ""
     """A section below the ranking."""
     folds: Mapping[str, str] = {}
-    """Further contents of the folds of these names."""
+    """Further contents of folds, by the names of these."""
     transient: float | None = None
     """The length of the transient (s) that the page can show separately, or None."""
     scripts: Sequence[str] = ()
@@ -41,17 +41,17 @@ class PageParts(NamedTuple):
 
 
 class BodyReport(Protocol):
-    """The hooks of a body for pictures and pages, functions of its module in `starhold.report.bodies`."""
+    """The functions that a body's module in `starhold.report.bodies` provides for pictures and pages."""
 
     def picture(self, flights: Sequence[Flight], scenario: Scenario) -> Picture:
-        """Collect the data of the figures."""
+        """Return the figures."""
         ...
 
     def page(self, flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-        """Make the body's parts of the page."""
+        """Return the body's parts of the page."""
         ...
 
 
 def report_of(body: str) -> BodyReport:
-    """Return the report of the body of this name, or the report for any body where it has none."""
+    """Return the report of the body of this name, or the general one if the body has no report of its own."""
     return body_module("starhold.report.bodies", body)

@@ -1,4 +1,4 @@
-"""The page with the outcome of a campaign, which opens offline and loads nothing, and recordings of selected runs."""
+"""The page with the outcome of a campaign, self-contained for offline use, and recordings of selected runs."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 
 
 FLAT = 1e-3
-"""Bin edges whose ratios agree within this tolerance belong to a logarithmic scale."""
+"""The tolerance within which the ratios of bin edges must agree for a logarithmic scale."""
 DECADES = 2.0
 """Quantities over time that span more powers of ten than this are drawn on a logarithmic scale."""
 DEEPEST = 12.0
-"""The most powers of ten that are shown of a quantity over time."""
+"""The largest number of powers of ten shown for a quantity over time."""
 NEAR = 1.0
 """A bound is not drawn if its distance from all values exceeds this multiple of their range."""
 
 
 def histograms(result: CampaignResult, words: Wording) -> list[dict[str, Any]]:
-    """Make a plot for each metric that has a histogram for some law."""
+    """Return a plot for each metric that has a histogram for some law."""
     plots: list[dict[str, Any]] = []
     for metric in headings_of(result, words):
         spreads = {
@@ -111,7 +111,7 @@ def _near(bound: float, low: float, high: float, log: bool) -> bool:
 
 
 def envelopes(result: CampaignResult, words: Wording) -> list[dict[str, Any]]:
-    """Make a plot over time for each quantity, all laws in it."""
+    """Return a plot over time for each quantity, with all laws."""
     names = list(dict.fromkeys(envelope.name for law in result.laws for envelope in law.envelopes))
     plots: list[dict[str, Any]] = []
     for name in names:
@@ -165,33 +165,32 @@ def _lines(envelope: Envelope) -> dict[str, NDArray[np.float64]]:
 READING = {
     "verdict": (
         "Met, missed or not decided, for a share of all flights and with a confidence, both fixed beforehand. Met: if "
-        "less than that share kept the requirement, so few failures would occur with a probability of at most 1 minus "
+        "less than that share met the requirement, so few failures would occur with a probability of at most 1 minus "
         "the confidence (the consumer's risk). Not decided: too few runs."
     ),
-    "failure probability": "Its lower and its upper bound by Clopper and Pearson's exact formula, each valid by "
-    "itself with the confidence; for a campaign that stops early, the bounds of a confidence sequence.",
+    "failure probability": "Its lower and upper bounds by Clopper and Pearson's exact formula, each valid "
+    "with the confidence; for a campaign that stops early, the bounds of a confidence sequence.",
     "margin": (
-        "How far a run is on the good side of the requirement's bound; below zero it misses. Margin kept: a margin that "
-        "at least the required share of all flights keeps, with the confidence, by an order statistic."
+        "The distance of a run from the requirement's bound, negative if it misses. Margin kept: a margin that "
+        "at least the required share of all flights has, with the confidence, by an order statistic."
     ),
     "known before flight": "A condition that is known before flight is not averaged over: its quartiles are judged "
     "separately, and a requirement is met only if each of them meets it.",
-    "5 %, median, 95 %": "Five, fifty and ninety-five in a hundred of the runs that have the metric lie below.",
+    "5 %, median, 95 %": "Five, fifty and ninety-five per cent of the runs that have the metric lie below.",
     "lost, without value": "A lost run counts as missing every requirement on a value that it lacks.",
     "over time": "The largest value of each run in each window of time counts. Line: the median; band: 5 to 95 %; "
-    "thin lines: the least and the largest of all runs that were not lost. Quantiles are right to within 3 %, the "
-    "extremes are "
-    "exact.",
+    "thin lines: the minimum and maximum over all runs that were not lost. Quantiles are accurate to within 3 %, the "
+    "extremes are exact.",
 }
 
 
 MOST_AGAIN, MOST_DRIVERS = 25, 10
-"""The most runs worth flying again that are listed for a law, and the most drivers of each kind."""
+"""The largest numbers of runs worth flying again listed for a law, and of drivers of each kind."""
 NBSP = "\N{NO-BREAK SPACE}"
 
 
 def render(scenario: Scenario, result: CampaignResult) -> str:
-    """Make the report of a campaign as HTML text: the same of the same results. Whatever comes from files is escaped."""
+    """Return the report of a campaign as HTML; equal results give equal text. Text from files is escaped."""
     words = Wording.of(scenario.body, result)
     spreads, over_time = histograms(result, words), envelopes(result, words)
     required = tables.verdicts(result, words)
@@ -218,7 +217,7 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
     ]
     data = {
         "laws": [{"name": law.law, "colour": colour(number)} for number, law in enumerate(result.laws)],
-        # The comparison's script draws these, and a campaign has none.
+        # The comparison's script draws these elements, which a campaign does not have.
         "plots": [],
         "histograms": [_for_script(plot) for plot in spreads],
         "envelopes": [_for_script(plot) for plot in over_time],
@@ -230,18 +229,18 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
 
 
 def _folded(section: Section | None) -> str:
-    """Fold a section, to be opened by the reader."""
+    """Return a section as a fold that the reader may open."""
     return "" if section is None else fold(section.heading, _shown(section._replace(heading="")))
 
 
 def _shown(section: Section, fit: bool = False) -> str:
-    """A section as HTML."""
+    """Return a section as HTML."""
     head = f"<h3>{escape(section.heading)}</h3>\n" if section.heading else ""
     return f"{head}{table_html(section.table, fit=fit) if section.table.rows else ''}\n{note(section.note)}"
 
 
 def _headlines(result: CampaignResult, words: Wording) -> Iterator[str]:
-    """Sum up the verdicts of each law in a sentence."""
+    """Yield a sentence with the verdicts on each law."""
     for number, law in enumerate(result.laws):
         text = escape(headline(law, result.sampling, words).replace(" %", f"{NBSP}%"))
         yield f'<p class="said">{pill(outcome_of(law))}<span><b>{swatch(number)}{escape(law.law)}</b> {text}</span></p>'
@@ -257,7 +256,7 @@ def _in_words(result: CampaignResult) -> str:
 
 
 def _drivers(result: CampaignResult, words: Wording) -> Iterator[str]:
-    """Show what makes runs of each law fail and what moves its metrics, as a picture and as a table."""
+    """Yield the drivers of failures and of metrics for each law, as a picture and as a table."""
     from starhold.campaign.drivers import RISK
 
     looked = [(number, law) for number, law in enumerate(result.laws) if law.drivers is not None]
@@ -278,7 +277,7 @@ def _for_script(plot: dict[str, Any]) -> dict[str, Any]:
 
 
 def _switches(result: CampaignResult) -> str:
-    """Buttons that show and hide laws in all pictures; empty for one law."""
+    """Return buttons that show and hide laws in all pictures; "" for a single law."""
     pressed = 'type="button" aria-pressed="true"'
     buttons = "".join(
         f'<button class="law-switch" data-law="{number}" {pressed}>{swatch(number)}{escape(law.law)}</button>'
@@ -333,7 +332,7 @@ RECORDED = "recorded"
 
 
 def write_campaign(scenario: Scenario, result: CampaignResult) -> Path:
-    """Fly the selected runs of a campaign again, record them, and write the campaign's page; return the page's path."""
+    """Fly the selected runs of a campaign again, store their recordings, and write the campaign's page; return its path."""
     for law in result.laws:
         for again in law.again:
             flown = fly_again(result.folder, again.run, law.law)

@@ -1,4 +1,4 @@
-"""The tables that sum up a campaign and explain why runs fail, for the terminal and the page."""
+"""The tables that summarize a campaign and explain why runs fail, for the terminal and the page."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ class Section(NamedTuple):
 
 
 def numbers(*names: str) -> list[Column]:
-    """Make columns of numbers, aligned right, from headings; a second line of a heading follows a "|"."""
+    """Return columns of numbers, aligned right, with these headings; "|" begins the second line of a heading."""
     return [Column(name, below, ">") for name, _, below in (one.partition("|") for one in names)]
 
 
 def law_cell(result: CampaignResult, number: int) -> Cell:
-    """Show a law's name in its colour."""
+    """Return a cell with a law's name in its colour."""
     return Cell(result.laws[number].law, "law", number)
 
 
 def verdicts(result: CampaignResult, words: Wording) -> Section | None:
-    """One row for each requirement and law; None where nothing is required."""
+    """Return a table with a row for each requirement and law; None where nothing is required."""
     rows: list[list[Any]] = []
     ends: set[int] = set()
     for name in dict.fromkeys(verdict.name for law in result.laws for verdict in law.verdicts):
@@ -67,7 +67,7 @@ def verdicts(result: CampaignResult, words: Wording) -> Section | None:
     stopped = any(verdict.until_decided for law in result.laws for verdict in law.verdicts)
     columns = [
         *map(Column, ("requirement", "law", "verdict")),
-        *numbers("keep it|and must", "miss it|and may"),
+        *numbers("meet it|and must", "miss it|and may"),
         *numbers(f"failure probability|{'whenever stopped' if stopped else 'Clopper–Pearson'}"),
         *numbers("worst margin|and its run", "margin kept|by the required share"),
     ]
@@ -87,7 +87,7 @@ def _verdict(verdict: Verdict, words: Wording) -> list[Any]:
 
 
 def _conditions(result: CampaignResult) -> list[str]:
-    """List the conditions known before flight in which requirements are not met."""
+    """Return sentences on conditions known before flight under which requirements are not met."""
     sentences: list[str] = []
     for law in result.laws:
         for verdict in law.verdicts:
@@ -100,7 +100,7 @@ def _conditions(result: CampaignResult) -> list[str]:
 
 
 def runs(result: CampaignResult) -> Section:
-    """Count the runs of each law that were lost, and those that failed."""
+    """Return a table of the numbers of lost and of failed runs of each law."""
 
     def of_runs(number: int, among: int) -> str:
         return f"{count_text(number)} ({percent(number / max(among, 1))})" if number else "0"
@@ -114,7 +114,7 @@ def runs(result: CampaignResult) -> Section:
 
 
 def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> Section | None:
-    """Show the distribution of each metric under each law, required ones first. most: the largest number of metrics."""
+    """Return a table of the distribution of each metric for each law, required metrics first; most: of how many metrics."""
     headings, required = headings_of(result, words), {item.column for item in words.requirements.values()}
     rows: list[list[Any]] = []
     ends: set[int] = set()
@@ -138,7 +138,7 @@ def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> 
 
 
 def again(result: CampaignResult, most: int) -> Section | None:
-    """List the runs worth flying again, at most `most` of each law, with the command."""
+    """Return a table of runs worth flying again, at most `most` of each law, with the commands."""
     rows = [
         [law_cell(result, number), str(item.run), item.why, Cell(item.command, "typed")]
         for number, law in enumerate(result.laws)
@@ -154,7 +154,7 @@ def again(result: CampaignResult, most: int) -> Section | None:
 
 
 def brackets(result: CampaignResult, words: Wording) -> Section | None:
-    """Show the worst value of each metric: the one flown and the bound proved."""
+    """Return a table of the worst value flown and the bound proved for each metric."""
     rows: list[list[Any]] = []
     faults: list[str] = []
     for number, law in enumerate(result.laws):
@@ -169,7 +169,7 @@ def brackets(result: CampaignResult, words: Wording) -> Section | None:
     if not rows:
         return None
     note = (
-        "The worst flown is the worst of all runs and of a search over the box of the dispersions: no smaller bound can "
+        "The worst value flown is that of all runs and of a search over the box of the dispersions: no smaller bound can "
         "be true. The proved bound holds for every flight within the dispersions. The scenario file flies the worst run "
         "found."
     )
@@ -179,8 +179,8 @@ def brackets(result: CampaignResult, words: Wording) -> Section | None:
 
 
 def claims(result: CampaignResult, words: Wording) -> Section | None:
-    """Show the metrics that the claim about each loop as it flies bounds, for the flights that keep its premises; None where
-    no proof was requested."""
+    """Return a table of the metrics bounded by the claim about each loop as it flies, for flights that meet its premises;
+    None where no proof was requested."""
     rows: list[list[Any]] = []
     sentences: list[str] = []
     for number, claim in ((number, claim) for number, law in enumerate(result.laws) for claim in law.claims):
@@ -199,31 +199,31 @@ def claims(result: CampaignResult, words: Wording) -> Section | None:
 
 
 def _claimed(claim: ByClaim) -> str:
-    """State a claim, how many flights have its premises, and how often its assumption on noise holds."""
+    """Return sentences on a claim, the number of flights that meet its premises, and how often its noise bound holds."""
     if not claim.runs:
         return f"nothing is proved: {claim.text}."
     left = "".join(f", {count_text(count)} {why}" for why, count in claim.left.items())
-    said = f"{claim.text}. Of {counted(claim.runs, 'flight')} {count_text(claim.covered)} have its premises{left}."
+    said = f"{claim.text}. Of {counted(claim.runs, 'flight')} {count_text(claim.covered)} meet its premises{left}."
     if claim.share is None:
         return said
     share = f"{said} It holds for at least {percent(claim.share)} of flights of this duration"
     if claim.misled is None:
         return f"{share}; the readings that the law is given are not recorded."
-    return f"{share}, and the law is told more wrongly than it assumes in {count_text(claim.misled)} of these."
+    return f"{share}, and measurement errors exceed its assumption in {count_text(claim.misled)} of these."
 
 
 def dispersions(result: CampaignResult) -> Section | None:
-    """List the dispersed keys with their distributions."""
+    """Return a table of the dispersed keys with their distributions."""
     rows = [[key, how] for key, how in result.over.items()]
     return Section("Dispersions flown", Table([Column("key"), Column("distribution")], rows)) if rows else None
 
 
 UP, DOWN, BOTH = "213,94,0", "0,114,178", "123,63,160"
-"""Red, green and blue of what increases, decreases, and otherwise changes with an input."""
+"""The colours (red, green, blue) of effects that increase, decrease, or otherwise change with an input."""
 
 
 def drivers(causes: Drivers, words: Wording, most: int) -> Section:
-    """List what makes runs of a law fail and what drives its metrics, at most `most` of a kind."""
+    """Return a table of the drivers of failures and metrics of a law, at most `most` of each kind."""
     kinds = [
         [_failure(item) for item in causes.inputs if item.significant],
         [_pair(item) for item in causes.pairs if item.significant],
@@ -233,7 +233,7 @@ def drivers(causes: Drivers, words: Wording, most: int) -> Section:
     left = sum(map(len, kinds)) - len(rows)
     sentences = [f"{causes.failures} of {counted(causes.runs, 'run')} failed."]
     sentences += [] if rows else ["No input tested is significant."]
-    sentences += [f"{counted(left, 'weaker one')} that stand out as well are left out of the table."] if left else []
+    sentences += [f"{counted(left, 'weaker significant driver')} not listed in the table."] if left else []
     sentences += [f"{causes.remark[:1].upper()}{causes.remark[1:]}."] if causes.remark else []
     if causes.skipped:
         sentences.append(f"Not tested, because they are constant or lack values: {', '.join(causes.skipped)}.")
@@ -266,12 +266,13 @@ def _metric(item: MetricDriver, words: Wording) -> list[Any]:
 
 
 def _chance(item: FailureDriver | PairDriver | MetricDriver) -> str:
-    """Show a corrected p-value, unless it is below the least float."""
+    """Return a corrected p-value as text; one that underflows is shown as a bound."""
     return f"{item.corrected:.2g}" if item.corrected > 1e-300 else "< 1e-300"
 
 
 def indices(result: CampaignResult, words: Wording) -> list[Section]:
-    """Show the sensitivity indices of each law's metrics, or why there are none; nothing where none were requested."""
+    """Return tables of the sensitivity indices of each law's metrics, or the reasons why there are none; empty where none
+    were requested."""
     from starhold.campaign.sensitivity import Morris, Refused
 
     sections: list[Section] = []
@@ -324,13 +325,13 @@ def _with_width(value: float, width: float, scale: float = 1.0) -> str:
 
 
 def _strongest(values: Iterable[float]) -> Sequence[int]:
-    """Order the indices of values, the largest first, NaN last."""
+    """Return the indices of values in decreasing order of these, NaN last."""
     listed = list(values)
     return sorted(range(len(listed)), key=lambda i: (math.isnan(listed[i]), -listed[i]))
 
 
 def picture(causes: Drivers, words: Wording) -> str:
-    """Show the strengths of all significant inputs as colours: a row for each input, a column for each effect."""
+    """Return HTML that shows the strengths of all significant inputs as colours: a row per input, a column per effect."""
     cells = {
         (item.input, ""): Cell(f"{item.distance:.2f}", "shade", item.distance, BOTH)
         for item in causes.inputs
@@ -346,7 +347,7 @@ def picture(causes: Drivers, words: Wording) -> str:
     metrics = list(dict.fromkeys(metric for _, metric in cells))
     columns = [Column("input"), *numbers(*(words.measure(name).heading if name else "failure" for name in metrics))]
     rows = [[name, *(cells.get((name, metric), "·") for metric in metrics)] for name in dict.fromkeys(n for n, _ in cells)]
-    keys = ((UP, "grows with the input"), (DOWN, "falls with it"), (BOTH, "depends on it"))
+    keys = ((UP, "increases with the input"), (DOWN, "decreases with it"), (BOTH, "depends on it"))
     legend = " ".join(
         f'<span class="legend"><span class="key" style="background:rgba({colour},.6)"></span>{escape(meaning)}</span>'
         for colour, meaning in keys

@@ -1,5 +1,5 @@
-"""The words of a campaign: metrics and requirements in the units of the other pages, shares, counts, and the sentences that
-sum it up, each with its assumption."""
+"""The wording of campaigns: metrics and requirements in the units of the other pages, shares, counts, and the sentences that
+summarize a campaign, each with its assumption."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 DASH = "—"
 LOST = "lost"
-"""In the requirement that a motion does not diverge, this takes the place of the metric."""
+"""The name that replaces a metric in the requirement that a motion does not diverge."""
 INDEPENDENT = "random"
 """The sampling whose draws are independent of each other."""
 
 
 @dataclass(frozen=True)
 class Wording:
-    """The data for showing a campaign's numbers: its body's metrics, the requirements by name, the SI units of metrics by
-    name."""
+    """The data for showing a campaign's numbers: the body's metrics, the requirements by name, and the SI units of metrics
+    by name."""
 
     metric_set: MetricSet
     requirements: Mapping[str, Requirement]
@@ -38,26 +38,26 @@ class Wording:
 
     @classmethod
     def of(cls, body: str, result: CampaignResult) -> Wording:
-        """Make the wording for a campaign on the body of this name, whose analysis names the metrics."""
+        """Return the wording for a campaign on the body of this name, whose analysis names the metrics."""
         known = getattr(body_module("starhold.analysis", body), "METRICS", None) or MetricSet({}, ())
         units = {spread.metric: spread.unit for law in result.laws for spread in law.spreads}
         return cls(known, {item.name: item for item in result.requirements}, units)
 
     def measure(self, metric: str, unit: str | None = None) -> Measure:
-        """Return how a metric is shown: as on the other pages, else in its SI unit, angles in degrees."""
+        """Return the measure that shows a metric as on the other pages, else in its SI unit, angles in degrees."""
         known = self.metric_set.measures.get(metric)
         return known or plain_measure(metric, self.units.get(metric, "1") if unit is None else unit)
 
     def required(self, name: str) -> Measure:
-        """Return how the metric of the requirement of this name is shown."""
+        """Return the measure that shows the metric of the requirement of this name."""
         return self.measure(self.requirements[name].column if name in self.requirements else name)
 
     def is_loss(self, name: str) -> bool:
-        """Return whether the requirement of this name is that the motion does not diverge."""
+        """Return whether the requirement of this name demands that the motion does not diverge."""
         return name in self.requirements and self.requirements[name].column == LOST
 
     def asks(self, name: str) -> str:
-        """State what the requirement of this name demands; empty where only the name is known."""
+        """Return the demand of the requirement of this name in words; "" where only the name is known."""
         if name not in self.requirements:
             return ""
         item, measure = self.requirements[name], self.required(name)
@@ -66,12 +66,13 @@ class Wording:
         return f"{measure.heading} at {'most' if item.at_most else 'least'} {with_unit(item.bound, measure)}"
 
     def called(self, name: str) -> str:
-        """Return the name of a requirement and what it demands."""
+        """Return the name of a requirement together with its demand."""
         asks = self.asks(name)
         return f"{name}: {asks}" if asks and name != self.requirements[name].metric else asks or name
 
     def margin(self, name: str, value: float | None) -> str:
-        """Show a margin of the requirement of this name, with its unit; it is minus infinity where a run has no value."""
+        """Return a margin of the requirement of this name with its unit; the margin of a run without a value is minus
+        infinity."""
         if value is None:
             return DASH
         if self.is_loss(name):
@@ -80,7 +81,7 @@ class Wording:
 
 
 def figure(value: float, digits: int = 4) -> str:
-    """Show a number with a few digits, a whole number with up to seven; a dash for none."""
+    """Return a number with a few digits, a whole number with up to seven; a dash for NaN."""
     if math.isnan(value):
         return DASH
     if math.isinf(value):
@@ -89,18 +90,18 @@ def figure(value: float, digits: int = 4) -> str:
 
 
 def with_unit(value: float, measure: Measure) -> str:
-    """Show an SI value in a measure's unit, with the unit."""
+    """Return an SI value in a measure's unit, with the unit."""
     return f"{figure(value * measure.scale)} {measure.unit}".rstrip()
 
 
 def worst_text(bracket: Bracket, measure: Measure) -> str:
-    """Show the worst value of a metric, the largest or the least, as the first part of a bracket."""
+    """Return the worst value flown of a metric, as the first part of a bracket."""
     if math.isnan(bracket.flown):
         return "lost, or without a value"
     return f"{with_unit(bracket.flown, measure)} {order(bracket)} true"
 
 
-CONTRADICTED = "Contradicted by a flight, which is a fault of starhold: please report it with the scenario file."
+CONTRADICTED = "Contradicted by a flight, which is an error in starhold: please report it with the scenario file."
 
 
 def order(bracket: Bracket) -> str:
@@ -109,31 +110,31 @@ def order(bracket: Bracket) -> str:
 
 
 def few_percent(share: float) -> str:
-    """Show a bound of a failure probability with three digits."""
+    """Return a bound on a failure probability in percent with three digits."""
     return f"{figure(100.0 * share, 3)} %"
 
 
 def count_text(number: int) -> str:
-    """Show a count with separated thousands."""
+    """Return a count with separated thousands."""
     return f"{number:,}".replace(",", "\N{NARROW NO-BREAK SPACE}") if number >= 10_000 else str(number)
 
 
 def headings_of(result: CampaignResult, words: Wording) -> list[str]:
-    """List the metrics of a campaign: those of the body first, in its order, then the others."""
+    """Return the metrics of a campaign: those of the body first, in its order, then the others."""
     metrics = dict.fromkeys(spread.metric for law in result.laws for spread in law.spreads)
     known: list[str] = [metric for metric in words.metric_set.measures if metric in metrics]
     return [*known, *(metric for metric in metrics if metric not in known)]
 
 
 def bounds_text(verdict: Verdict) -> str:
-    """Show the bounds between which the failure probability lies, as far as they are known."""
+    """Return the known bounds on the failure probability as text."""
     if verdict.lower is None or verdict.upper is None:
         return DASH
     return f"{figure(100.0 * verdict.lower, 3)} to {few_percent(verdict.upper)}"
 
 
 def counted(number: int, what: str) -> str:
-    """Show a count and its noun, whose plural ends in s."""
+    """Return a count with its noun, whose plural ends in s."""
     return f"{count_text(number)} {what}{'' if number == 1 else 's'}"
 
 
@@ -153,7 +154,7 @@ def outcome_of(law: LawResult) -> str:
 
 
 def headline(law: LawResult, sampling: str, words: Wording) -> str:
-    """State in one or two sentences, without the law's name, whether a law meets its requirements, and on what evidence."""
+    """Return one or two sentences, without the law's name, on whether a law meets its requirements, with the evidence."""
     outcome = outcome_of(law)
     chosen = [verdict for verdict in law.verdicts if verdict.outcome == outcome]
     if outcome == "met":
@@ -167,13 +168,13 @@ def headline(law: LawResult, sampling: str, words: Wording) -> str:
 
 
 def flown_text(result: CampaignResult) -> str:
-    """State how many runs were flown of how many laws, and how they were drawn."""
+    """Return a sentence on the numbers of runs and laws and on the sampling."""
     laws = "one law" if len(result.laws) == 1 else f"each of {len(result.laws)} laws, all of which fly the same draws"
     return f"{counted(result.runs, 'run')} of {laws}; the dispersions are sampled by {sampled(result.sampling)}."
 
 
 def sampled(sampling: str) -> str:
-    """Describe a kind of sampling."""
+    """Return a sampling in words."""
     return SAMPLINGS.get(sampling, sampling)
 
 
@@ -205,7 +206,7 @@ def _shortfall(verdict: Verdict, words: Wording) -> str:
 def _open(verdicts: list[Verdict], total: int, sampling: str, words: Wording) -> str:
     if sampling != INDEPENDENT or not all(verdict.independent for verdict in verdicts):
         seen = listed([f"{percent(verdict.observed)} {_keep(verdict, words)}" for verdict in verdicts])
-        return f"is not judged, for runs by {sampled(sampling)} are not independent of each other; of those flown {seen}."
+        return f"is not judged, because runs by {sampled(sampling)} are not independent; of those flown {seen}."
     questions: list[str] = []
     for verdict in verdicts:
         part, one = verdict.worst_part, verdict.failures == 1
@@ -223,7 +224,7 @@ def _open(verdicts: list[Verdict], total: int, sampling: str, words: Wording) ->
 
 
 def _keep(verdict: Verdict, words: Wording) -> str:
-    return "are not lost" if words.is_loss(verdict.name) else f"keep {verdict.name}"
+    return "are not lost" if words.is_loss(verdict.name) else f"meet {verdict.name}"
 
 
 def _miss(verdict: Verdict, words: Wording) -> str:

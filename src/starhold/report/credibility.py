@@ -1,4 +1,4 @@
-"""The credibility factors of NASA-STD-7009: what the program knows about each, and what it does not."""
+"""The credibility factors of NASA-STD-7009, each with the evidence that the program has and the evidence that it lacks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def factors_of(review: Review, certificates: Sequence[Certificate]) -> dict[str, tuple[list[str], list[str]]]:
-    """List what the program knows for each factor, and what it does not."""
+    """Return for each factor the statements that the program can make, and those that it cannot."""
     evidence = review.evidence
     scenario, tables = evidence.scenario, evidence.scenario.table
     parts = [evidence.entry.law, evidence.loop.body, *(fitted.part for fitted in evidence.loop.parts)]
@@ -36,11 +36,11 @@ def factors_of(review: Review, certificates: Sequence[Certificate]) -> dict[str,
     frail: list[str] = []
     if review.has_campaign:
         result = evidence.campaign
-        drawn = ", ".join(result.over) or "nothing but noise"
+        drawn = ", ".join(result.over) or "only noise"
         uncertainty.append(f"{result.runs} runs, by {result.sampling} sampling, draw {drawn}.")
         causes = result.laws[0].drivers
         if causes is not None:
-            robustness.append(f"{causes.failures} of {counted(causes.runs, 'run')} failed, and the causes were sought.")
+            robustness.append(f"{causes.failures} of {counted(causes.runs, 'run')} failed; their drivers were sought.")
     else:
         unknown.insert(0, "The spread of results: there is no [campaign].")
         frail.append("What makes requirements fail: there is no [campaign].")
@@ -76,5 +76,5 @@ def factors_of(review: Review, certificates: Sequence[Certificate]) -> dict[str,
 
 
 def _released(module: Any) -> bool:
-    """Whether a model is one of starhold's own; a law made of modes is an object."""
+    """Return whether a model belongs to starhold; a law made of modes is an object, not a module."""
     return getattr(module, "__name__", type(module).__module__).startswith("starhold.")

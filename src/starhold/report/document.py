@@ -1,4 +1,4 @@
-"""A document is sections of sentences, tables and figures, written once and shown as a printable page and as Markdown."""
+"""Documents: sections of sentences, tables and figures, rendered as a printable page and as Markdown."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from starhold.report.commands import Block, Cell, Heading, Table
 
 
 class Figure(NamedTuple):
-    """A figure, drawn with the plotting library, and its caption without the final stop."""
+    """A function that draws a figure, and the caption without its full stop."""
 
     caption: str
     draw: Callable[[], Any]
@@ -27,7 +27,8 @@ Piece: TypeAlias = Block | Figure | Listing
 
 
 class Section(NamedTuple):
-    """A section with its name. fresh: it begins a page. A `Cell` of kind "section" links to the one that detail names."""
+    """A section with its name. fresh: whether it begins a page. A `Cell` of kind "section" links to the section named in
+    its detail."""
 
     name: str
     pieces: Sequence[Piece]
@@ -35,7 +36,7 @@ class Section(NamedTuple):
 
 
 def pages_of(title: str, sections: Sequence[Section], footer: str) -> tuple[str, str]:
-    """Render a document as self-contained HTML and as Markdown; sections and figures are numbered."""
+    """Return a document as self-contained HTML and as Markdown, with numbered sections and figures."""
     from starhold.report.figures import address, png
 
     heads = {one.name: f"{number} {one.name}" for number, one in enumerate(sections, 1)}
@@ -46,7 +47,7 @@ def pages_of(title: str, sections: Sequence[Section], footer: str) -> tuple[str,
 
 
 Drawn: TypeAlias = Mapping[int, tuple[str, str, str]]
-"""Return the number, the caption and the address of each figure."""
+"""The number, the caption and the address of each figure."""
 Names: TypeAlias = Mapping[str, str]
 
 
@@ -77,7 +78,7 @@ def _piece_html(piece: Piece, anchors: Names, drawn: Drawn) -> str:
 
 
 def block_html(block: Block, anchors: Names | None = None) -> str:
-    """Render a block of a command's result, whose cells may have style marks. anchors: of sections, by name."""
+    """Return a block of a command's result as HTML; its text may have style marks. anchors: those of sections, by name."""
     from starhold.report.tables import table_html
 
     level, kind = ("h2", "text tight") if anchors is None else ("h3", "told tight")
@@ -120,7 +121,7 @@ def _markdown(title: str, sections: Sequence[Section], footer: str, heads: Names
         lines += [text for piece in one.pieces if (text := _piece_markdown(piece, anchors, drawn))]
         if not place:
             lines.append("\n".join(f"* [{_safe(head)}](#{anchors[name]})" for name, head in heads.items()))
-    # The pictures come last, so that the text can be read and compared by itself.
+    # The pictures come last, so that the text can be read and compared without them.
     lines += [_safe(footer), *(f"[{number}]: {address}" for number, _, address in drawn.values())]
     return "\n\n".join(lines) + "\n"
 

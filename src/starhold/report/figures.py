@@ -16,13 +16,13 @@ from starhold.studies.flight import Flight
 
 DPI = 110
 NOTHING: Any = None
-"""Takes the place of a recording where none is needed."""
+"""Stands for a recording where none is needed."""
 POINTS = 2000
-"""The number of samples of a curve, about two for each column of pixels."""
+"""The number of samples of a curve, about two per column of pixels."""
 
 
 Picture: TypeAlias = dict[str, Callable[[], Any]]
-"""For each file name, a function that draws its figure without the runs: small, and quickly sent to another process."""
+"""For each file name, a function that draws its figure without the runs, and so can quickly be sent to another process."""
 
 
 def without_runs(flights: Sequence[Flight]) -> list[Flight]:
@@ -33,19 +33,19 @@ def without_runs(flights: Sequence[Flight]) -> list[Flight]:
 def paint(what: Picture, folder: Path) -> list[Path]:
     """Write the figures into `folder`, which exists, and return their paths."""
     with warnings.catch_warnings(), sharing_axes():
-        # A name in a script that the font lacks is drawn as boxes; a warning would not help the user.
+        # A name with characters missing in the font is drawn as boxes; a warning would not help the user.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
         return [save(make(), folder / f"{key}.png") for key, make in what.items()]
 
 
 _shared: dict[tuple[Any, ...], tuple[Any, Any, float]] | None = None
-"""The figures whose axes are used again, with their axes and height, by what `blank` makes of them; None: none are."""
+"""Figures for reuse, with their axes and height, by the arguments of `blank`; None: figures are not reused."""
 
 
 @contextmanager
 def sharing_axes() -> Generator[None]:
-    """Let figures of one form be one figure, drawn anew, because axes and their ticks take long to make: each figure has to
-    be saved before the next is made."""
+    """Reuse one figure for all of the same layout, because axes and ticks take long to make; each figure has to be saved
+    before the next is made."""
     global _shared
     _shared = {}
     try:
@@ -55,7 +55,7 @@ def sharing_axes() -> Generator[None]:
 
 
 def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[Flight], name: str, shaded: Any = ()) -> Any:
-    """A figure of panels over one time axis, grey where the estimate is not valid."""
+    """Return a figure of panels over one time axis, grey where the estimate is not valid."""
     from starhold.report.ticks import label_ticks
 
     count = len(plot.panels)
@@ -70,7 +70,7 @@ def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[F
             width = width_of(number, len(flights), plot.chatters)
             axis.plot(times[: len(curve)], curve, color=colour(number), linewidth=width)
         axis.set_yscale("log" if panel.log else "linear")
-        # Ticks take most of the drawing time: there are few, and no minor ones are compared with them where there are none.
+        # Ticks take most of the drawing time, so there are few, and none are compared with missing minor ticks.
         minor = panel.log and panel.decades() <= 2.0
         axis.xaxis.remove_overlapping_locs, axis.yaxis.remove_overlapping_locs = False, minor
         if panel.log:
@@ -115,12 +115,12 @@ WORD_HEIGHT, WORD_ROWS = 9.5, 4
 
 
 def word_rows(marks: Sequence[Mark], end: float) -> dict[Mark, int]:
-    """Place the word of each mark in a row so that none overlap; words without room are left out."""
+    """Return the row of each mark's word, such that none overlap; words without room are left out."""
     ends, rows = [-1.0] * WORD_ROWS, dict[Mark, int]()
     for mark in sorted(marks):
         row = next((row for row, taken in enumerate(ends) if mark.time >= taken), None)
         if mark.word and row is not None:
-            # About 4.6 points a letter on axes of 507 points.
+            # About 4.6 points per letter, on axes of 507 points.
             rows[mark] = row
             ends[row] = mark.time + end * (4.6 * len(shortened(mark.word, 24)) + 8.0) / 507.0
     return rows
@@ -129,7 +129,7 @@ def word_rows(marks: Sequence[Mark], end: float) -> dict[Mark, int]:
 def blank(
     rows: int, columns: int, height: float, title: str, flights: Sequence[Flight], name: str, dashed: str, above: float = 0.0
 ) -> tuple[Any, Any]:
-    """Make a figure with its title, its legend and its axes, which leave room above (inches)."""
+    """Return a figure with its title and legend, and its axes, which leave room above (inches)."""
     form = rows, columns, height, above, *map(_legend_text, flights)
     if _shared is not None and form in _shared:
         figure, axes, total = _shared[form]
@@ -143,7 +143,7 @@ def blank(
     for axis in axes:
         plain(axis)
     for axis in grid[:-1].ravel():
-        # The place of a label is sought among those of ticks even where there is no label.
+        # Matplotlib computes a label's position from those of the ticks even where there is no label.
         axis.xaxis.set_label_coords(0.5, 0.0)
     if _shared is not None:
         _shared[form] = figure, axes, total
@@ -151,7 +151,7 @@ def blank(
 
 
 def _clear(figure: Any, axes: Sequence[Any]) -> None:
-    """Remove what was drawn, and leave the legend, the axes and their ticks."""
+    """Remove everything drawn, except the legend, the axes and their ticks."""
     drawn = [artist for axis in axes for kind in (axis.lines, axis.patches, axis.texts) for artist in kind]
     for artist in [*figure.texts, *drawn]:
         artist.remove()
@@ -161,7 +161,7 @@ def _clear(figure: Any, axes: Sequence[Any]) -> None:
 
 
 def plain(axis: Any, lines: str = "both") -> None:
-    """Make axes with a light grid, both ways or at the values of "x" alone, and no frame at the top and right."""
+    """Give axes a light grid, in both directions or only at values of "x", and no frame at the top and right."""
     axis.grid(True, axis=lines, color="0.9", linewidth=0.6)
     axis.tick_params(labelsize=8.5)
     for side in ("top", "right"):
@@ -171,8 +171,8 @@ def plain(axis: Any, lines: str = "both") -> None:
 def headed(
     height: float, title: str, flights: Sequence[Flight], name: str, dashed: str, gap: float
 ) -> tuple[Any, float, float]:
-    """Make a figure with its title and its legend; return also its height (inches) and the top of its axes, a gap (inches)
-    below. Distances are fixed, because layout engines draw everything twice.
+    """Return a figure with its title and legend, its height (inches), and the top of its axes, `gap` (inches) below the
+    legend. Distances are fixed, because layout engines draw everything twice.
     """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -222,7 +222,7 @@ def shortened(text: str, most: int) -> str:
 
 
 def width_of(number: int, count: int, thin: bool = False) -> float:
-    """Later laws get thinner lines, so that equal curves show as a line within a line."""
+    """Return a line width that decreases from law to law, so that equal curves show as a line within a line."""
     return (1.2 if thin else 2.4) - (0.5 if thin else 1.3) * number / max(count - 1, 1)
 
 
@@ -236,7 +236,7 @@ def framed(
     sharey: bool = False,
     **grid: Any,
 ) -> tuple[Any, Any]:
-    """Make a figure of this size with its title, and a grid of axes with margins: left, right, below, above (all inches)."""
+    """Return a figure of this size with its title, and a grid of axes with margins left, right, below, above (inches)."""
     from matplotlib.figure import Figure
 
     (width, height), (left, right, below, above) = size, sides
@@ -251,14 +251,15 @@ def framed(
 
 
 def png(figure: Any, level: int = 6) -> bytes:
-    """Return a figure as a PNG file, compressed so much. It names no software, so that releases make equal files."""
+    """Return a figure as the bytes of a PNG file; level: of compression. It does not name the software, so that releases
+    make equal files."""
     file = BytesIO()
     figure.savefig(file, format="png", metadata={"Software": None}, pil_kwargs={"compress_level": level})
     return file.getvalue()
 
 
 def address(picture: bytes) -> str:
-    """Return a PNG file as a data address."""
+    """Return a PNG file as a data URL."""
     return f"data:image/png;base64,{b64encode(picture).decode()}"
 
 

@@ -1,4 +1,4 @@
-"""The phase portrait of a system with the sets that were certified, one panel a claim."""
+"""The phase portrait of a system with its certified sets, one panel per claim."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,10 +14,10 @@ INSIDE, SET, AGAINST, TRUE = COLOURS[5], COLOURS[0], COLOURS[1], COLOURS[2]
 
 
 def draw(drawn: Sequence[Portrait], title: str) -> Any:
-    """Draw a figure of portraits, each of which has a V."""
+    """Return a figure of portraits, each of which has a V."""
     across = min(len(drawn), 2)
     down = -(-len(drawn) // across)
-    # Panels are as wide as they are drawn where both axes have the same scale.
+    # The width of a panel allows for an equal scale of both axes.
     shares = [max(_share(item) for item in drawn[k::across]) for k in range(across)]
     wide, height = 4.1 * sum(shares) + 0.75 * (across - 1), 4.1 * down + 0.75 * (down - 1) + 1.45
     width = max(wide + 0.85, 5.2)
@@ -41,7 +41,7 @@ def draw(drawn: Sequence[Portrait], title: str) -> Any:
 
 
 def _share(item: Portrait) -> float:
-    """Width over height of a panel."""
+    """Return the ratio of width to height of a panel."""
     share = float((item.x[-1] - item.x[0]) / (item.y[-1] - item.y[0]))
     return share if 0.5 < share < 2.0 else 1.3
 
@@ -60,7 +60,7 @@ def _panel(axis: Any, item: Portrait) -> None:
             item.x, item.y, item.V, levels=[level], colors=[SET], linewidths=1.6, linestyles="-" if proved else "--"
         )
     if item.equilibrium is None and not unstable:
-        # A little more than M, which may have zero width.
+        # Slightly more than M, which may have zero width.
         floor = (1e-4 if item.u is not None else 2e-3) * (level or top)
         axis.contourf(item.x, item.y, item.V, levels=[-np.inf, floor], colors=[SET], alpha=0.5)
         axis.contour(item.x, item.y, item.V, levels=[floor], colors=[SET], linewidths=0.9)

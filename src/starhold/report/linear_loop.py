@@ -19,21 +19,21 @@ from starhold.studies.flight import Flight
 from starhold.studies.linear import linear_of
 
 NOTE = (
-    "The loop near rest on target, the target standing still, exact between control instants under the held torque, at the "
-    "gains of the file; no limit of the torque, and no delay of the computation. One axis is opened at a time; the others "
+    "The loop near rest on a fixed target, exact between control instants under held torque, with the gains of the file, "
+    "without a torque limit and without computational delay. One axis is opened at a time; the others "
     "stay closed. The margins are computed in floating point and prove nothing."
 )
 DASHES = {"x": "none", "y": "7 3", "z": "2 3"}
 DIGITS = 4
 POINTS = 4
-"""The number of frequencies of the response for each point of a curve."""
+"""The number of frequencies of the response per point of a curve."""
 DEEPEST = 60.0
-"""The depth below the crossover (dB) to which plots reach."""
+"""The gain below 0 dB (dB) to which plots extend."""
 WIDTH, HEIGHT, LEFT, BOTTOM = 430.0, 250.0, 52.0, 36.0
 
 
 class Known(NamedTuple):
-    """A law's linear loop, its response and margins, by the law's number; or the reason `why` there is none."""
+    """The linear loop of the law with this number, its response and margins; or the reason `why` there is none."""
 
     number: int
     name: str
@@ -44,13 +44,13 @@ class Known(NamedTuple):
 
     @classmethod
     def of(cls, number: int, name: str, linear: Linear) -> Self:
-        """Collect what is known of a linear loop."""
+        """Return a linear loop with its response and margins."""
         shown = response(linear)
         return cls(number, name, linear, shown, margins(linear, shown))
 
 
 def section(scenario: Scenario, flights: Sequence[Flight]) -> str:
-    """Write the section as HTML; empty where no law has a linear form."""
+    """Return the section as HTML; "" where no law has a linear form."""
     known = [_know(scenario, number, flight.name) for number, flight in enumerate(flights)]
     if not any(one.linear for one in known):
         return ""
@@ -60,13 +60,13 @@ def section(scenario: Scenario, flights: Sequence[Flight]) -> str:
     apart = f" Left out: {escape(', '.join(left))}." if left else ""
     return (
         f'<p class="note">{NOTE}{apart}</p>\n{table}\n{without}'
-        f'<div class="plot"><h3>Bode and Nichols plots of the loop, cut about each axis</h3>{_plots(known)}</div>'
+        f'<div class="plot"><h3>Bode and Nichols plots of the loop, opened about each axis</h3>{_plots(known)}</div>'
         '<p class="note">Solid: about x, dashed: y, dotted: z. The cross in the Nichols plot is the point −1.</p>'
     )
 
 
 def margins_table(known: Sequence[Known]) -> Table:
-    """Make a row for each law and axis."""
+    """Return a table with a row per law and axis."""
     heads = ("gain margin|dB", "phase margin|deg", "delay margin|s", "crossover|rad/s", "peak of |1/(1 + L)||")
     named = [Column(name, unit, ">") for name, _, unit in (head.rpartition("|") for head in heads)]
     return Table([Column("law"), Column("axis"), *named], [row for one in known for row in _rows(one)])
@@ -92,7 +92,7 @@ def _rows(one: Known) -> list[list[Any]]:
 
 
 def _decibels(about: Margins) -> str:
-    """Show the gain margin up, and down where less gain also loses stability."""
+    """Return the upper gain margin (dB), and the lower one where a smaller gain also loses stability."""
     up = f"{20.0 * math.log10(about.gain):.1f}" if math.isfinite(about.gain) else "none"
     return f"{up}, −{-20.0 * math.log10(about.less):.1f}" if about.less > 0.0 else up
 
@@ -154,7 +154,7 @@ def _plots(known: Sequence[Known]) -> str:
 
 
 def _unwrapped(loop: Any) -> Any:
-    """Return the phase without jumps, within (-270, 90] degrees at the highest gain."""
+    """Return the unwrapped phase, within (-270, 90] degrees at the highest gain."""
     phase = np.unwrap(np.angle(loop))
     return phase - 2.0 * math.pi * np.ceil((phase[0] - 0.5 * math.pi) / (2.0 * math.pi))
 

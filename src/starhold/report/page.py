@@ -1,4 +1,4 @@
-"""The page of a comparison, which opens offline and loads nothing, and the data with which it flies its scenario again."""
+"""The page of a comparison, self-contained for offline use, and the data with which it flies its scenario again."""
 
 from __future__ import annotations
 
@@ -55,16 +55,16 @@ LABELS = {
 FOLDS = {
     "Motion": "attitude, rates, positions",
     "Actuators": "torque, wheels, limits",
-    "Sensors and estimate": "what the law is told",
+    "Sensors and estimate": "what the law measures",
     "Proofs": "every claim, its assumptions, and how it was shown",
     "Linear loop": "margins, Bode and Nichols plots",
     "Numbers and settings": "gains, the spacecraft, what the key numbers mean",
 }
-"""The folds below the first screen, each with a note of its contents."""
+"""The folds below the first screen, with a note on the contents of each."""
 
 
 def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | str:
-    """Return the data of the page's sliders, or the reason why nothing can be moved."""
+    """Return the data of the page's sliders, or the reason why there are none."""
     numbers = {flight.name: number for number, flight in enumerate(flights)}
     made = reflight(scenario, numbers)
     laws = made.laws
@@ -93,7 +93,7 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
 
 
 def _dial(made: Reflight, key: str) -> dict[str, Any]:
-    """Describe a key that can be moved: its numbers, bounds and texts."""
+    """Return the numbers, bounds and texts of a key with a slider."""
     item = made.gains.get(key)
     gain = _declared(made.scenario, key) if item is None else item.gain
     bounds = {"above": gain.above, "least": gain.at_least, "most": gain.at_most}
@@ -106,19 +106,19 @@ def _dial(made: Reflight, key: str) -> dict[str, Any]:
 
 
 def _declared(scenario: Scenario, key: str) -> Gain:
-    """Find the declaration of a key of the scenario's own tables; a fault's keys are declared by the craft."""
+    """Return the declaration of a key of the scenario's own tables; keys of faults are declared by the craft."""
     table, _, name = key.replace("fault[1]", "spacecraft").partition(".")
     return declared(type(getattr(scenario.table, table)).model_fields[name]) or Gain()
 
 
 def _written(scenario: Scenario, key: str, value: Any) -> str:
-    """Return the file's text for a key of its own tables, where that has units; else ""."""
+    """Return the text in the file of a key of the scenario's own tables, if it has a unit; else ""."""
     table, _, name = key.partition(".")
     return with_units(read_toml(scenario.text, scenario.where).get(table, {}).get(name), value)
 
 
 def _law(law: Reflown) -> dict[str, Any]:
-    """Return the data with which the page flies a law; numbers are the bytes of 64-bit floats."""
+    """Return the data with which the page flies a law; numbers are encoded as bytes of 64-bit floats."""
     return {
         "name": law.name,
         "fly": _script(law.program),
@@ -140,7 +140,7 @@ def _law(law: Reflown) -> dict[str, Any]:
 
 
 def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
-    """Return the equations of the metrics of a law's flights; numbers that a slider or the duration changes go by name."""
+    """Return the equations of a law's metrics; numbers that a slider or the duration changes are given by name."""
     run, settling = flight.recording, table.settling
     every, limit = table.simulation.record_every, run.attrs["limit"]
     tolerances, estimated = (
@@ -161,7 +161,7 @@ def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
 
 
 def _script(program: Program) -> dict[str, str]:
-    """A program's text, and the names of the functions in it that are called."""
+    """Return a program's text and the names of its functions that are called."""
     text = JavaScript(program)
     return {"text": str(text), "name": text.name}
 
@@ -171,7 +171,7 @@ def _bytes(numbers: Any) -> str:
 
 
 def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
-    """State the conditions under which each claim of the page remains valid."""
+    """Return the conditions under which each claim on the page remains valid."""
     claims: list[dict[str, Any]] = []
     for number, flight in enumerate(flights):
         if flight.name not in laws:
@@ -205,9 +205,9 @@ def _ranking(flights: Sequence[Flight]) -> dict[str, Any]:
 
 
 def _flown_again(flight: Flight) -> str:
-    """Tell whose commands fly in the page, where those of the recorded flight came from a process."""
+    """Return a note on the commands in the page's flights, where a process commanded the recorded flight."""
     process = flight.recording.attrs.get("law_process")
-    said = f"What is flown again in this page is commanded by the file's law {flight.name}, not by {process}."
+    said = f"Flights in this page are commanded by the file's law {flight.name}, not by {process}."
     return note(said) if process else ""
 
 
@@ -218,7 +218,7 @@ def _limit(flight: Flight) -> dict[str, Any]:
 
 
 def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
-    """Make the report of a scenario's flights as HTML text: the same of the same flights. All text from files is escaped."""
+    """Return the report of a scenario's flights as HTML; equal flights give equal text. Text from files is escaped."""
     parts = report_of(scenario.body).page(flights, scenario)
     living = "the page of this body has none" if parts.sampling is None else living_data(scenario, flights, parts.sampling)
     (lead, *plots), (required, counts) = parts.data["plots"], verdicts(scenario, flights)

@@ -1,4 +1,4 @@
-"""The building blocks of pages about any body: text, tables, and data for their scripts."""
+"""The building blocks of pages for any body: text, tables, and data for scripts."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ def document(
     answer: str = "",
     living: Mapping[str, Any] | None = None,
 ) -> str:
-    """Make a page of these sections, headed by the scenario's name with the answer in a word or two (HTML), a description
-    and some facts, and ended by the scenario's text; the scripts, from the assets, read the data, which names the laws.
-    living: the data for flying again, None for a page without sliders."""
+    """Return a page of these sections. Its head has the scenario's name with the answer in a word or two (HTML), a
+    description and some facts, its end the scenario's text; the scripts, from the assets, read the data, which names the
+    laws. living: the data for flying again, None for a page without sliders."""
     lead = " · ".join(filter(None, (scenario.table.description, facts)))
     body = [
         f'<header class="top"><h1>{escape(scenario.name)}</h1>{answer}</header>',
@@ -73,7 +73,7 @@ def document(
 
 
 def fold(name: str, content: str, hint: str = "") -> str:
-    """Make a part of the page that the reader may unfold; nothing where it is empty."""
+    """Return a part of the page that the reader may unfold; "" where it is empty."""
     if not content:
         return ""
     below = f"<small>{escape(hint)}</small>" if hint else ""
@@ -82,13 +82,13 @@ def fold(name: str, content: str, hint: str = "") -> str:
 
 
 def beside(*boxes: str) -> str:
-    """Place boxes side by side, the first the widest; empty ones are left out."""
+    """Return boxes side by side, of which the first is the widest; empty ones are left out."""
     there = [box for box in boxes if box]
     return f'<div class="{"two" if len(there) > 1 else "one"}">{"".join(there)}</div>' if there else ""
 
 
 def plain_document(title: str, body: Iterable[str], styles: Sequence[str] = ("uplot.css", "page.css")) -> str:
-    """Make a page of these parts, without empty ones, with its title and the styles of these names."""
+    """Return a page of these parts, without empty ones, with its title and the style sheets of these names."""
     return "\n".join(
         [
             "<!DOCTYPE html>",
@@ -116,7 +116,7 @@ DIALS = """\
 
 
 def _embedded(name: str, data: Mapping[str, Any]) -> str:
-    """Data for scripts. A script's text ends at the first "</", also within a string."""
+    """Return data for scripts, escaped because a script's text ends at the first "</", even within a string."""
     embedded = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{name}">{embedded}</script>'
 
@@ -126,12 +126,12 @@ def _asset(name: str) -> str:
 
 
 def law_data(flights: Sequence[Flight]) -> list[dict[str, str]]:
-    """List names and colours."""
+    """Return the names and colours of the laws."""
     return [{"name": flight.name, "colour": colour(number)} for number, flight in enumerate(flights)]
 
 
 def views(flights: Sequence[Flight], frames: int, title: str, what: str, note: str) -> str:
-    """Make a three-dimensional view for each law, and one player for all. what: the subject of a view, in a word."""
+    """Return a three-dimensional view for each law, and one player for all. what: the subject of a view, in a word."""
     boxes = "".join(
         f'<div class="view"><div><span>{swatch(number)}{escape(flight.name)}</span><output></output></div>'
         f'<canvas role="img" aria-label="{what} under {escape(flight.name)}"></canvas></div>'
@@ -156,7 +156,7 @@ def over_time_data(plot: Plot, flights: Sequence[Flight]) -> dict[str, Any]:
 
 
 def plot_box(plot: Mapping[str, Any], level: int = 3, more: str = "") -> str:
-    """Make the box of a plot, which a script fills; level: of its heading; more: text beside the heading."""
+    """Return the box of a plot, which a script fills; level: that of its heading; more: text beside the heading."""
     notes = plot["notes"] if "notes" in plot else [f"– – {plot['dashed']}"] * bool(plot["dashed"])
     spans = "".join(f"<span>{escape(note)}</span>" for note in notes)
     below = f'<p class="note">{escape(plot["note"])}</p>' if plot.get("note") else ""
@@ -165,7 +165,7 @@ def plot_box(plot: Mapping[str, Any], level: int = 3, more: str = "") -> str:
 
 
 def transient_switch(transient: float | None) -> str:
-    """Make a switch between the whole run and its transient (s), if there is one."""
+    """Return a switch between the whole run and its transient (s), if there is one."""
     if transient is None:
         return ""
     first = f"{float(f'{transient:.3g}'):g}"
@@ -176,7 +176,7 @@ def transient_switch(transient: float | None) -> str:
 
 
 def laws_table(flights: Sequence[Flight]) -> str:
-    """List the laws with their gains."""
+    """Return a table of the laws with their gains."""
     rows: list[list[Any]] = []
     for number, flight in enumerate(flights):
         gains = ", ".join(f"{name} = {value_text(*gain)}" for name, gain in flight.gains.items())
@@ -185,7 +185,7 @@ def laws_table(flights: Sequence[Flight]) -> str:
 
 
 def versions() -> str:
-    """State the versions that made the page."""
+    """Return a sentence with the versions that made the page."""
     from starhold.version import __version__
 
     libraries = ", ".join(f"{name} {metadata.version(name)}" for name in ("llvmlite", "numpy", "plotly"))
@@ -210,5 +210,5 @@ def panel_data(panel: Panel, order: list[int], thin: bool = False) -> dict[str, 
 
 
 def rounded(values: Iterable[float], digits: int = 6) -> list[float | None]:
-    """Round numbers to a few digits for JSON; those that are not finite become null."""
+    """Return numbers rounded to a few digits for JSON; those that are not finite become null."""
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(list(values), dtype=float).tolist()]

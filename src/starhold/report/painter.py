@@ -1,4 +1,4 @@
-"""Draws the figures in a process of its own, while proofs and the page are made."""
+"""Draws the figures in a separate process, while proofs and the page are made."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 
 LIBRARY = ("matplotlib.backends.backend_agg", "matplotlib.figure", "starhold.report.ticks", "starhold.report.accuracy")
-"""The modules that drawing figures loads in addition to `starhold.report.figures`."""
+"""The modules needed to draw figures, in addition to `starhold.report.figures`."""
 
 
 class Painter:
-    """A process that draws the figures of flights that `draw` sends it; `finish` waits until it has. Where this process can
-    be copied and there is another processor, it starts at once, and loads its library beside all that comes before. Leaving
-    the context ends it. Unless `wanted`, nothing is drawn, no process starts, and figures of earlier flights are removed."""
+    """A process that draws the figures of flights sent by `draw`; `finish` waits for it. Where this process can fork and
+    there is another processor, it starts at once and loads its library in parallel with earlier work. It ends with the
+    context. Unless `wanted`, nothing is drawn, no process starts, and figures of earlier flights are removed."""
 
     def __init__(self, wanted: bool = True) -> None:
         self._wanted, self._process = wanted, None
@@ -57,7 +57,7 @@ class Painter:
             return
         if self._process is None:
             self._start()
-        # `finish` tells how it ended.
+        # `finish` reports how it ended.
         with suppress(OSError):
             self._requests.send((picture, folder.absolute()))
 
@@ -84,7 +84,7 @@ class Painter:
 
 
 def _draw(requests: Connection, failures: Connection, other: Connection) -> None:
-    """Draw the figures that are requested; what prevents that goes to `failures`, and what libraries say to nobody."""
+    """Draw the requested figures; errors go to `failures`, and output of libraries is discarded."""
     # With its last copy closed, the end of the original process is noticed here.
     other.close()
     # Ctrl-C goes to the original process alone, which ends this one.

@@ -1,5 +1,5 @@
-"""The plots of a craft near a libration point: its path and its control in planes and over time, and the phase portrait of
-the unstable X axis, which shows from how far a limited control brings the craft back."""
+"""The plots of a craft near a libration point: its path and control in planes and over time, and the phase portrait of the
+unstable X axis, which shows from what distance a limited control returns the craft."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 WINDOW = 1.7
-"""Half the width of the picture, as a multiple of the saddles' distance."""
+"""Half the width of the picture, as a multiple of the saddles' distance from the origin."""
 FAMILY = 26
 """The number of paths from each edge of the picture."""
 STEPS, STEP = 900, 0.01
@@ -56,7 +56,7 @@ class _Axis:
         return w, x + np.clip(-self.k_x * x - self.k_v * w, -self.saddle, self.saddle)
 
     def path(self, start: Any, step: float) -> NDArray[np.float64]:
-        """Return the paths (2, n, steps) from starts (2, n), by the classical Runge-Kutta method; they stop far away."""
+        """Return the paths (2, n, steps) from starts (2, n), by the classical Runge-Kutta method; they end far away."""
         state, states, advance = np.array(start, dtype=float), list[Any](), runge_kutta(self.slope)
         for _ in range(STEPS):
             states.append(state)
@@ -65,7 +65,7 @@ class _Axis:
         return np.stack(states, axis=-1)
 
     def separatrix(self, side: float) -> tuple[Curve, Curve]:
-        """Return the path that ends in a saddle: the boundary of the region of attraction."""
+        """Return the path that ends in a saddle, the boundary of the region of attraction."""
         small = 1e-6 * self.saddle
         starts = np.array([[side * self.saddle + small, side * self.saddle - small], [-small, small]])
         halves = self.path(starts, -2.0 * STEP)
@@ -74,8 +74,8 @@ class _Axis:
 
 
 def phase_portrait(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot | None:
-    """Plot x and x' of laws that hold an equilibrium, among the paths of the X axis alone; None where no law does so or
-    where no law's X axis has a saturation limit of its own."""
+    """Return the plot of x and x' for laws that hold an equilibrium, with paths of the X axis alone; None where no law does
+    so or no law's X axis has its own saturation limit."""
     resting = [
         entry
         for entry in entries
@@ -120,7 +120,7 @@ def phase_portrait(flights: Sequence[Flight], entries: Sequence[LawEntry], scena
 
 
 LONG = 400.0 * DAY
-"""Runs longer than this (s) are drawn over years."""
+"""Runs longer than this (s) have a time axis in years."""
 ROOM = 0.08
 """The share of a picture left free around its contents."""
 PATH = 4000
@@ -131,7 +131,7 @@ LEAST = 0.02
 
 @dataclass(frozen=True)
 class PathPlots:
-    """All plots: the projections that the publication draws, the phase portrait of X where a law holds an equilibrium, paths
+    """All plots: the projections as in the publication, the phase portrait of X where a law holds an equilibrium, paths
     (n, 3) in length units, and the plots over time with their times."""
 
     times: Curve
@@ -143,7 +143,7 @@ class PathPlots:
 
 
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> PathPlots:
-    """Make the plots of a comparison, with curves over time thinned to about `points` samples."""
+    """Return the plots of a comparison, with curves over time thinned to about `points` samples."""
     entries = [scenario.pick(flight.name) for flight in flights]
     units = scenario.table.libration.units
     longest = max((flight.recording["time"] for flight in flights), key=len)
@@ -167,7 +167,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> PathP
 
 
 def unit_text(scenario: Scenario) -> str:
-    """Name the unit of lengths."""
+    """Return the name of the unit of length."""
     length = scenario.table.libration.units.length
     return "Earth diameters" if length == EARTH_DIAMETER else f"units of {length / 1e3:g} km"
 
@@ -177,7 +177,7 @@ def _path(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _away(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int, scenario: Scenario, clock: str) -> Plot:
-    """Return the distance from the circle, in its plane and across it, or from the equilibrium."""
+    """Return the plot of the distance from the circle, in and across its plane, or from the equilibrium."""
     length = scenario.table.libration.units.length / 1e3
     x = [thin(flight.recording["position"][:, 0] * length, factor) for flight in flights]
     goals = [goal_of(entry.gains) for entry in entries]
@@ -215,8 +215,8 @@ def _control(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int
 
 
 def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot:
-    """Plot (x, y), (y, z) and (u_y, u_z), as published, and (u_x, u_z), in which the control comes nearest to the limit;
-    with the circle and the limit."""
+    """Return plots of (x, y), (y, z) and (u_y, u_z), as published, and of (u_x, u_z), in which the control comes closest to
+    its limit; with the circle and the limit."""
     goals = [goal_of(entry.gains) for entry in entries]
     radii = sorted({goal.radius for goal in goals if isinstance(goal, CircleGoal)})
     size = max([*radii, *(max(map(abs, goal.at(0.0)[0])) for goal in goals)]) or 1.0
@@ -272,7 +272,7 @@ def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenari
 
 
 def _square(guide: Guide) -> Guide:
-    """Use the limit of each axis in place of that of the norm."""
+    """Return the square of a limit per axis in place of the circle of a limit on the norm."""
     size = float(np.abs(guide.x).max())
     x, y = size * np.array([1.0, 1.0, -1.0, -1.0, 1.0]), size * np.array([-1.0, 1.0, 1.0, -1.0, -1.0])
     return Guide(x, y, guide.text, guide.colour)

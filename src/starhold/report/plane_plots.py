@@ -1,4 +1,4 @@
-"""Plots in a plane: paths of the laws over one another, with reference lines; as figures, and as data of a page."""
+"""Plots in a plane, with the paths of all laws and reference lines, as figures and as data of a page."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,8 +29,7 @@ class Line(NamedTuple):
 
 
 class Guide(NamedTuple):
-    """A line that is not a law's path: dashed (in a law's colour where it concerns that law alone) or faint, the edge of an
-    area, or points."""
+    """A reference line: dashed (in a law's colour if it concerns only this law) or faint, the edge of an area, or points."""
 
     x: Curve
     y: Curve
@@ -41,8 +40,8 @@ class Guide(NamedTuple):
 
 @dataclass(frozen=True)
 class Plane:
-    """One plot: the names of its axes, a path for each law, guides, its ranges (x and y from and to), and whether both axes
-    have the same scale."""
+    """One plot: the names of its axes, a path per law, guides, the ranges of x and y, and whether both axes have the same
+    scale."""
 
     xlabel: str
     ylabel: str
@@ -70,7 +69,7 @@ def ring(radius: float, text: str, shade: str | None = None) -> Guide:
 
 
 def draw_planes(plot: PlanePlot, flights: Sequence[Flight], name: str) -> Any:
-    """Draw a figure of plots in a plane."""
+    """Return a figure of plots in a plane."""
     count = len(plot.planes)
     figure, total, top = headed(8.1 if count > 1 else 6.9, plot.title, flights, name, plot.dashed, 0.10)
     axes: Any = figure.subplots(-(-count // 2), min(count, 2), squeeze=False).ravel()

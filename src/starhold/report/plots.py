@@ -1,4 +1,4 @@
-"""Plots over time, for figures and pages alike: panels with a curve for each law."""
+"""Plots over time for figures and pages: panels with a curve per law."""
 
 from collections.abc import Container, Sequence
 from colorsys import hls_to_rgb
@@ -17,7 +17,7 @@ COLOURS = (
 """Okabe and Ito's palette, distinct to colour-blind readers, without colours invisible on white or black; then seven more
 that differ from these and from one another."""
 GOLDEN = 0.5 * (3.0 - 5.0**0.5)
-"""The hue step as a share of a full turn: any number of hues this far apart fill the circle evenly."""
+"""The hue step as a share of a full turn: hues at this spacing fill the circle evenly for any number of them."""
 
 
 def colour(number: int) -> str:
@@ -34,7 +34,7 @@ Curve: TypeAlias = NDArray[np.float64]
 OFF_SCALE = 5.0
 """Limits above this multiple of the largest value of all curves are not drawn."""
 ACTING = ("N", "N m", "N m s", "A m^2")
-"""Units of what acts on a body."""
+"""Units of quantities that act on a body."""
 FLAG = "_is_new"
 """The suffix of quantities that mark the control instants with a new reading; plots over a flight omit them."""
 
@@ -48,14 +48,14 @@ class Panel:
     log: bool = False
     levels: tuple[float, ...] = ()
     span: tuple[float, float] | None = None
-    """The range of ordinates to show, where that of the curves would be a poor choice."""
+    """The range of ordinates to show, if not that of the curves."""
     source: tuple[Any, ...] = ()
     """The source of the curves when a page flies again: ("column", recorded quantity, component, factor), ("norm", quantity,
     factor), ("angle", factor), ("turn", 0 roll, 1 pitch, 2 yaw) or ("acceleration", component, factor); empty for curves
     that do not change."""
     bounds: tuple[tuple[int, Curve, Curve], ...] = ()
-    """Proved bounds by the indices of their flights: times, and the value not exceeded from then on, until the last
-    time; drawn dashed."""
+    """Proved bounds, drawn dashed: the index of the flight, times, and the value that is not exceeded from each time until
+    the last."""
 
     def decades(self) -> float:
         """The number of decades that a logarithmic panel spans."""
@@ -77,7 +77,7 @@ class Plot:
     panels: list[Panel]
     dashed: str = ""
     chatters: bool = False
-    """Whether curves may jump from sample to sample; their lines are thin, with the wildest at the back."""
+    """Whether curves may jump from sample to sample; their lines are thin, with the most irregular at the back."""
     clock: str = "s"
     """The unit of the times."""
     topic: str = "Motion"
@@ -85,7 +85,7 @@ class Plot:
 
 
 def first_alone(plot: Plot) -> list[Plot]:
-    """Split a plot in two: its first panel, and the others."""
+    """Return a plot split in two: its first panel, and the others."""
     rest = replace(plot, name=f"{plot.name}-further", title=f"{plot.title}, further", panels=plot.panels[1:])
     return [replace(plot, panels=plot.panels[:1]), *([rest] if rest.panels else [])]
 
@@ -98,13 +98,13 @@ class Mark(NamedTuple):
 
 
 def thinning(count: int, points: int) -> int:
-    """Return the number of samples of which a curve keeps two, so that about `points` remain."""
+    """Return the factor of `thin` that leaves about `points` of `count` samples."""
     return 1 if count <= points else int(np.ceil(2 * count / points))
 
 
 def thin(values: Curve, factor: int) -> Curve:
-    """Keep two of every `factor` samples, to be drawn over `thin_times`. Where omitted samples swing further than those
-    kept, the least and the greatest replace them: chatter keeps its amplitude, and shifts by less than `factor` periods.
+    """Return two of every `factor` samples, to be drawn over `thin_times`. Where omitted samples exceed those kept, the
+    minimum and maximum replace them, so chatter keeps its amplitude and shifts by less than `factor` periods.
     """
     if factor == 1 or not len(values):
         return values
@@ -130,7 +130,7 @@ def thin_times(times: Curve, factor: int) -> Curve:
 
 
 def back_to_front(flights: Sequence[Flight], plot: Plot) -> list[int]:
-    """Draw curves that chatter behind those that do not, which they would hide."""
+    """Return the order of curves from back to front: those that chatter come first, because they would hide others."""
     numbers = list(range(len(flights)))
     if plot.chatters:
         numbers.sort(key=lambda i: -float(flights[i].metrics.get("chatter") or 0.0))
@@ -138,20 +138,20 @@ def back_to_front(flights: Sequence[Flight], plot: Plot) -> list[int]:
 
 
 def near(levels: tuple[float, ...], curves: list[Curve]) -> tuple[float, ...]:
-    """Return the levels, except those that would flatten the curves."""
+    """Return the levels without those so far away that they would flatten the curves."""
     peak = max((float(np.abs(curve).max(initial=0.0)) for curve in curves), default=0.0)
     return levels if max(levels) <= OFF_SCALE * peak else ()
 
 
 def positive(label: str, curves: list[Curve], levels: tuple[float, ...]) -> Panel:
-    """Make a logarithmic panel; zeros leave gaps, and a panel of zeros is linear."""
+    """Return a logarithmic panel, with gaps at zeros; a panel with only zeros is linear."""
     log = any((curve > 0.0).any() for curve in curves)
     shown = [np.where(curve > 0.0, curve, np.nan) for curve in curves] if log else curves
     return Panel(label, shown, log, levels)
 
 
 def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
-    """Scale the panel by the runs that did not diverge, so that diverged ones do not flatten the others."""
+    """Return the panel scaled to the runs that did not diverge, so that diverged ones do not flatten the others."""
     kept = [c for c, flight in zip(panel.curves, flights, strict=True) if flight.lost is None and np.isfinite(c).any()]
     if not kept or all(flight.lost is None for flight in flights):
         return panel
@@ -165,9 +165,9 @@ def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
 def recorded_plots(
     flights: Sequence[Flight], factor: int, known: Container[str] = (), readers: tuple[str, ...] = ()
 ) -> list[Plot]:
-    """Plot each further quantity that all flights record, with the name, unit and meaning that its part declares; a panel
-    for each component. Flags of new readings are not drawn. readers: prefixes of the names of sensors' and estimators'
-    outputs."""
+    """Return a plot of each further quantity that all flights record, with a panel per component and the name, unit and
+    meaning that its part declares. Flags of new readings are not drawn. readers: prefixes of the names of outputs of sensors
+    and estimators."""
     longest = max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
     _, coordinates = longest.variables()
     plots: list[Plot] = []

@@ -1,4 +1,4 @@
-"""The section of the page on claims: which are proved of each law, which are not, and why."""
+"""The section of the page on claims: which are proved about each law, which are not, and why."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -47,11 +47,11 @@ SYMBOLS = {
     "eigenvalues": ("eigenvalues at the control period", ""),
     "longest": ("longest period shown", "s"),
 }
-"""The numbers of a proof that no sentence states: the meaning of each, and its unit, which for V depends on the law."""
+"""The numbers of a proof that no sentence states, with the meaning and unit of each; the unit of V depends on the law."""
 
 
 def section(flights: Sequence[Flight]) -> str:
-    """Write the section as HTML; empty where no flight has a certificate."""
+    """Return the section as HTML; "" where no flight has a certificate."""
     blocks = [_law(flight, number, i) for number, flight in enumerate(flights) for i in range(len(flight.certificates))]
     if not blocks:
         return ""
@@ -67,7 +67,7 @@ def _law(flight: Flight, number: int, place: int) -> str:
         (heading, [_claim(c, certificate.subject, left_text(flight, place, c.kind), marks[c.kind]) for c in claims])
         for heading, claims in grouped(certificate).items()
     ]
-    # Claims about less of the loop stay folded.
+    # Claims that leave out more of the loop stay folded.
     claims = "".join(
         f'<details class="share"{opened}><summary>{escape(_sentence_case(heading))}</summary>{"".join(parts)}</details>'
         for opened, (heading, parts) in zip([" open", *[""] * len(groups)], groups, strict=False)
@@ -111,7 +111,7 @@ def _obligation(obligation: Obligation) -> Markup:
 
 
 def _numbers(claim: Claim) -> str:
-    """List the numbers behind the sentence, without infinite ones and a cross term that is not needed."""
+    """Return a table of the numbers behind a claim's sentence, without infinite ones and an unneeded cross term."""
     values = claim.numbers | {name: value for name, value in claim.witness.items() if value}
     items = [
         f"<dt>{escape(meaning)}</dt><dd>{escape(_text(name, values[name]))}{f' {escape(unit)}' if unit else ''}</dd>"

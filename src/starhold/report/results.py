@@ -1,4 +1,4 @@
-"""Files of results: each appears under its name only when it is complete."""
+"""Writes files of results; each gets its name only when it is complete."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ STUDIED = tuple(
 )
 TIMING = ("timing.json", "timing.png")
 MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, *TIMING, *STUDIED)
-"""A folder with one of these holds results."""
+"""Files of which each marks a folder of results."""
 
 
 def open_folder(folder: Path, force: bool) -> Path:
@@ -51,7 +51,7 @@ def open_folder(folder: Path, force: bool) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         claim(folder)
         clear_unfinished(folder)
-        # Checked once no other process can write them.
+        # Checked after locking, when no other process can write them.
         marks = [mark for mark in MARKS if (folder / mark).exists()]
         if marks and not force:
             raise InputError(str(folder), "", f"results already there ({marks[0]})", "another folder with -o, or --force")
@@ -68,7 +68,7 @@ def open_folder(folder: Path, force: bool) -> Path:
 
 
 def _clear(folder: Path) -> None:
-    """Remove what an earlier command wrote, and nothing else."""
+    """Remove the files that an earlier command wrote, and nothing else."""
     try:
         laws = list(json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["laws"])
     except (OSError, ValueError, KeyError, TypeError):
@@ -90,10 +90,10 @@ def _clear(folder: Path) -> None:
 
 
 def _exported(folder: Path) -> list[str]:
-    """List the files that an export of this folder wrote."""
+    """Return the files that an earlier export wrote into this folder."""
     try:
         names = [Path(name) for name in json.loads((folder / EXPORT).read_text(encoding="utf-8"))["files"]]
-        # Never a file outside the folder, whatever the list says.
+        # Never a file outside the folder, whatever the list contains.
         return [str(name) for name in names if not name.is_absolute() and ".." not in name.parts]
     except (OSError, ValueError, KeyError, TypeError):
         return []
@@ -116,7 +116,8 @@ def _lemma_files(folder: Path) -> dict[str, list[int]]:
 
 
 def write_lemmas(folder: Path) -> list[Path]:
-    """Write the kernel's checks of a folder's certificate.json as lemmas for Rocq, a file for each certificate in it."""
+    """Write the kernel's checks of a folder's certificate.json as lemmas for Rocq, one file per certificate in it; return
+    the paths."""
     from starhold.certification.rocq import printed
     from starhold.kernel.check import check
 
@@ -141,7 +142,7 @@ def write_summary(scenario: str, results: dict[str, Any], path: Path) -> None:
 
 
 def _finite(value: Any) -> Any:
-    """Return a value in which numbers that are not finite are None."""
+    """Return a value with None in place of numbers that are not finite."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in cast("dict[Any, Any]", value).items()}
     if isinstance(value, list | tuple):
@@ -181,8 +182,8 @@ def write_result(result: commands.Result, name: str, subject: str, folder: Path)
 
 
 def study_into(name: str, about: tuple[Any, ...], folder: Path | None) -> Any:
-    """Run the command of this name on a subject, and return what it computed, which is written into the folder, if one is
-    given. InputError, before anything is computed, if the folder holds results or cannot be written."""
+    """Run the study of the command of this name and return what it computed; write the result into the folder, if given.
+    InputError, before anything is computed, if the folder holds results or cannot be written."""
     declared = commands.command(name)
     subject = declared.prepare(*about)
     into = None if folder is None else open_folder(folder, force=False)
@@ -235,12 +236,12 @@ def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path, d
 
 
 BLOCK = 65_536
-"""The number of samples that are copied at a time."""
+"""The number of samples copied at a time."""
 
 
 class _Sink(io.FileIO):
-    """A file that keeps its write error and lets the writer go on, because the HDF5 library does not survive an error while
-    it closes a file."""
+    """A file that stores a write error and lets the writer continue, because the HDF5 library does not survive an error
+    while closing a file."""
 
     failure: OSError | None = None
 
@@ -263,7 +264,7 @@ class _Sink(io.FileIO):
 
 def write_netcdf(run: Recording, path: Path) -> None:
     """Write a run as a new file. OSError if it cannot be written."""
-    # Loaded only here, where it is needed; not xarray, which takes longer to load than most flights.
+    # Imported here, where it is needed; not xarray, which takes longer to load than most flights.
     import h5netcdf
     import h5py
 

@@ -1,4 +1,4 @@
-"""The document of a review: what is required, what is known about it and how, and what is left open."""
+"""The document of a review: the requirements, the evidence for each, and the open points."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ PLACES = {
 """The section that holds the evidence of each method."""
 ATTITUDE = "rigid-body"
 DRIVERS = 8
-"""The most drivers of each kind that are shown."""
+"""The largest number of drivers of each kind shown."""
 PICTURES = ("angle", "wheel-momentum")
-"""The figures of a flight that are shown, if it has them; else the first."""
+"""The figures of a flight to show, if it has them; else the first."""
 
 
 class Open(str):
@@ -69,11 +69,11 @@ class Open(str):
 
 
 class Listed(Open):
-    """A point that appears in the list alone, because its section says the same in other words."""
+    """An open point that appears only in the list, because its section states it in other words."""
 
 
 Points: TypeAlias = list[tuple[str, str]]
-"""The points that are left open, each with the section that says so."""
+"""The open points, each with the section that states it."""
 
 
 def sections_of(review: Review) -> tuple[list[Section], Points]:
@@ -105,7 +105,7 @@ def _safe_rows(rows: Iterable[Sequence[Any]]) -> list[list[Any]]:
 
 
 def _table(names: str, rows: Iterable[Sequence[Any]], title: str = "") -> Table:
-    """Make a table of text; names: its headings, separated by "|"."""
+    """Return a table of text; names: its headings, separated by "|"."""
     return Table([*map(Column, names.split("|"))], _safe_rows(rows), title)
 
 
@@ -164,7 +164,7 @@ def _assumptions(review: Review) -> Iterator[Piece]:
     yield _table("role|part|model|valid for", rows, "Of models")
     silent = [f"{role} {name}" for role, name, part in parts if not part.card.assumptions]
     if silent:
-        yield Open(f"Limits of validity are not stated of {enumerated(silent)}.")
+        yield Open(f"Limits of validity are not stated for {enumerated(silent)}.")
 
 
 def _requirements(review: Review) -> Iterator[Piece]:
@@ -227,7 +227,7 @@ def _momentum(review: Review) -> Iterator[Piece]:
     evidence = review.evidence
     wheels, run = evidence.loop.wheels, evidence.flight.recording
     if wheels is None or "wheel_momentum" not in run.arrays:
-        yield "There is no momentum budget, for there are no wheels."
+        yield "There is no momentum budget, because there are no wheels."
         return
     peaks, rotors = np.nanmax(np.abs(run["wheel_momentum"]), axis=0), evidence.loop.rotors
     rows: list[list[Any]] = []
@@ -321,7 +321,7 @@ def _certificates(review: Review) -> Iterator[Piece]:
         first = strongest(one.claims)[0]
         covered += [f"{name}: {coverage(first, subject)} ({HEADINGS[first.kind]})."] if coverage(first, subject) else []
         if first.outcome == "proved" and first.left_out:
-            points.append(Open(f"{name}: no proof about the motion takes in {enumerated(first.left_out)}."))
+            points.append(Open(f"{name}: no proof about the motion includes {enumerated(first.left_out)}."))
         # Certificates of later phases begin at states that this flight does not reach.
         inside = study_of(review.evidence.scenario.body).start_inside(given) if given.step == 0 else {}
         outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
@@ -337,8 +337,8 @@ def _certificates(review: Review) -> Iterator[Piece]:
 
 
 def _credibility(review: Review) -> Iterator[Piece]:
-    """State what is known for each factor of NASA-STD-7009; people assign the levels."""
-    yield "The factors are those of NASA-STD-7009; no level is assigned, for that is left to people."
+    """Yield the evidence for each factor of NASA-STD-7009; people assign the levels."""
+    yield "The factors are those of NASA-STD-7009; assigning levels is left to people."
     factors = factors_of(review, _issued(review))
     rows = [[name, " ".join(known) or "nothing", " ".join(blank)] for name, (known, blank) in factors.items()]
     yield _table("factor|known|not stated", rows)

@@ -1,4 +1,4 @@
-"""The settings of a scenario as tables: all values of its file, with meanings, and the defaults."""
+"""The settings of a scenario as tables: all values of its file and the defaults, with their meanings."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ MANY = 9
 
 
 def settings(scenario: Scenario) -> str:
-    """Return all tables of a scenario, those of its parts included."""
+    """Return all tables of a scenario as HTML, including those of its parts."""
     parts: list[str] = []
     written = read_toml(scenario.text, scenario.where)
     shared = {key: scenario.table.shared[key] for key in _taken(scenario)}
     for name in type(scenario.table).model_fields:
         table = getattr(scenario.table, name)
-        # Draws of a campaign are not flown here, nor is a target if another is given as a part.
+        # The draws of a campaign are not flown here, nor is [target] if a part replaces it.
         is_part = any(fitted.part.role == name for fitted in scenario.parts)
         if isinstance(table, BaseModel) and name != "campaign" and not is_part:
             parts.append(_table(name, table, shared, written.get(name, {})))
@@ -42,7 +42,7 @@ def settings(scenario: Scenario) -> str:
 
 
 def _taken(scenario: Scenario) -> set[str]:
-    """List the keys that give parameters to the parts and laws of a scenario, including targets of modes."""
+    """Return the keys that set parameters of the parts and laws of a scenario, including targets of modes."""
     fitted = [*scenario.parts, *(target for entry in scenario.laws for target in entry.targets)]
     declared = [item for one in fitted if not one.part.table for item in one.part.fields()]
     declared += [item for entry in scenario.laws for item in entry.law.fields(entry.form)]
@@ -50,7 +50,7 @@ def _taken(scenario: Scenario) -> set[str]:
 
 
 def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> str:
-    """Show one table of the scenario with the descriptions of its schema, and numbers with units as in the file; keys
+    """Return one table of the scenario with the descriptions of its schema, and numbers with units as in the file; keys
     without a value are left out, unless parts supply a default."""
     properties = type(table).model_json_schema()["properties"]
     rows: list[tuple[str, ...]] = []
@@ -71,15 +71,15 @@ def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> st
 
 
 def with_units(written: Any, value: Any) -> str:
-    """Return the file's text of numbers, where that has units; "" where it has none."""
+    """Return the text of numbers in the file, if they have units there; else ""."""
     texts = cast(list[Any], written) if isinstance(written, list) else [written]
     numbers = isinstance(value, (int, float, tuple, list, np.ndarray)) and not isinstance(value, bool)
     return ", ".join(texts) if numbers and texts and all(isinstance(text, str) for text in texts) else ""
 
 
 def _part(fitted: Fitted, shared: Collection[str], written: Mapping[str, Any]) -> str:
-    """Show the parameters of a part with their units and meanings; numbers that the file gives with units are shown as
-    written. Parameters given by these shared keys of the scenario are left out."""
+    """Return the parameters of a part with their units and meanings; numbers that the file gives with units are shown as
+    written. Parameters set by shared keys are left out."""
     rows: list[tuple[str, ...]] = []
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
         if item.gain.shared in shared:

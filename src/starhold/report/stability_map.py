@@ -1,4 +1,5 @@
-"""The decay rate (degree of stability) over the gains, with the mode that decides it, the torque budget and the optimum."""
+"""The map of the decay rate (degree of stability) over the gains, with the dominant mode, the torque budget and the
+optimum."""
 
 from typing import Any, NamedTuple
 
@@ -9,11 +10,11 @@ from starhold.report.figures import DPI
 from starhold.synthesis.stability_degree import Optimum, boundary, degree, optimum
 
 POINTS = 400
-"""The number of gains along each side of the map, about two pixels apart."""
+"""The number of gains along each side of the map, one for about two pixels."""
 DASHES = ((1, 1.2), (5, 2), (7, 2, 1, 2))
-"""One for each axis."""
+"""The dash pattern of each axis."""
 LINE = "#D55E00"
-"""The budget's colour, which stands out from the map's blues and yellows also to colour-blind readers."""
+"""The budget's colour, distinct from the map's blues and yellows also for colour-blind readers."""
 SAME = 1e-9
 """Moments that differ by less than this share count as equal."""
 
@@ -21,8 +22,8 @@ SAME = 1e-9
 class StabilityMap(NamedTuple):
     """The contents of the map.
 
-    K_a: (POINTS,); K_w: (POINTS,); eta: (POINTS, POINTS), by K_w, then K_a; ask: commanded torque over the budget, of the
-    same shape; best: the optimum; ratios: (3,); alpha (rad), omega (1/t0) and budget as given."""
+    K_a: (POINTS,); K_w: (POINTS,); eta: (POINTS, POINTS), indexed by K_w, then K_a; ask: commanded torque over the budget,
+    of the same shape; best: the optimum; ratios: (3,); alpha (rad), omega (1/t0) and budget: the arguments."""
 
     K_a: Any
     K_w: Any
@@ -36,9 +37,9 @@ class StabilityMap(NamedTuple):
 
 
 def stability_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> StabilityMap:
-    """Compute the map around the optimum. Arguments and errors as in `draw_map`."""
+    """Return the map around the optimum. Arguments and errors as in `draw_map`."""
     best = optimum(ratios, alpha, omega, budget)
-    # The optimum at fixed shares of both sides, so that the words around it stay on their sides of the border.
+    # The optimum is at fixed shares of both sides, so that the labels stay on their sides of the boundary.
     K_a = np.linspace(0.0, 2.0 * best.K_a, POINTS)
     K_w = np.linspace(0.0, 1.6 * best.K_w, POINTS)
     eta = degree(K_a, K_w[:, None], ratios)
@@ -48,7 +49,7 @@ def stability_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) 
 
 
 def draw_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Any:
-    """Draw the map of eta(K_a, K_w). Equal arguments give equal files.
+    """Return a figure of the map eta(K_a, K_w). Equal arguments give equal files.
 
     ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0); budget:
     L. ValueError as from `optimum`."""
@@ -102,7 +103,7 @@ def _budget(axis: Any, what: StabilityMap) -> None:
 
 
 def _curves(axis: Any, what: StabilityMap) -> list[Any]:
-    """Draw the border between the two decisive modes, and each axis' critical damping; return the legend of these lines."""
+    """Draw the boundary between the two dominant modes and each axis' critical damping; return the legend of these lines."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
     from matplotlib.patheffects import withStroke
@@ -123,7 +124,8 @@ def _curves(axis: Any, what: StabilityMap) -> list[Any]:
 
 
 def _words(axis: Any, what: StabilityMap) -> None:
-    """Label the decisive mode on each side of the border, which runs through the middle of the map, and mark the optimum."""
+    """Label the dominant mode on each side of the boundary, which runs through the middle of the map, and mark the
+    optimum."""
     named, best = sorted(_axes(what.ratios), key=lambda pair: pair[1]), what.best
     box = {"boxstyle": "round,pad=0.3", "facecolor": "white", "edgecolor": "none", "alpha": 0.9}
     above, below = f"slow aperiodic root\nof {named[0][0]} decides", f"oscillation\nof {named[-1][0]} decides"
@@ -133,7 +135,7 @@ def _words(axis: Any, what: StabilityMap) -> None:
 
 
 def _axes(ratios: tuple[float, ...]) -> list[tuple[str, float]]:
-    """Name the axes, those of equal moments together, each with its ratio."""
+    """Return the names of the axes with their ratios; axes of equal moments share one name."""
     groups: list[tuple[str, float]] = []
     for name, ratio in zip("xyz", ratios, strict=True):
         for number, (names, other) in enumerate(groups):

@@ -14,19 +14,19 @@ from starhold.report.commands import OUTCOMES, Cell, Column, Table
 from starhold.report.plots import colour
 
 PILLS = {"green": "proved", "red": "refuted", "yellow": "undecided"}
-"""The styles of pages for the colours of outcomes."""
+"""The style classes for the colours of outcomes."""
 
 
 class Markup(str):
-    """HTML that a cell shows unchanged; text from files is already escaped."""
+    """HTML that a cell shows unchanged, with text from files already escaped."""
 
 
 def table_html(table: Table, kind: str = "", fit: bool = False, rows: Mapping[int, str] | None = None) -> str:
-    """Make a table that scrolls if it is too wide; with `fit` it is no wider than its contents. Without column names it has
-    no head. rows: attributes of rows by index."""
+    """Return a table as HTML, which scrolls if it is too wide; with `fit` it is no wider than its contents. Without column
+    names it has no head. rows: attributes of rows by index."""
     headed = any(column.name for column in table.columns)
     sides = [f' class="{"number" if column.format else "words"}"' if headed else "" for column in table.columns]
-    # On a narrow screen each cell of such a table takes a line of its own.
+    # On a narrow screen each cell of such a table has its own line.
     named = [
         f'{side} data-head="{escape(column.name)}"' if "rows" in kind else side
         for side, column in zip(sides, table.columns, strict=True)
@@ -42,12 +42,12 @@ def table_html(table: Table, kind: str = "", fit: bool = False, rows: Mapping[in
 
 
 def titled(title: str, table: Table) -> str:
-    """Make a section that holds a table below a heading."""
+    """Return a section with a table below a heading, as HTML."""
     return f"<section><h3>{escape(title)}</h3>\n{table_html(table, 'text')}</section>"
 
 
 def listed(rows: Sequence[Sequence[Any]]) -> Table:
-    """Make a table of rows without a head."""
+    """Return a table of these rows without a head."""
     return Table([Column("")] * max(map(len, rows), default=0), rows)
 
 
@@ -78,34 +78,35 @@ def _cell(value: Any, side: str) -> str:
 
 
 def pill(outcome: str, text: str = "") -> str:
-    """Show an outcome, or a text in its place, in the outcome's colour; nothing where there is none."""
+    """Return an outcome, or a text in its place, in the outcome's colour; "" where there is none."""
     style = PILLS.get(OUTCOMES.get(outcome, ""))
     return f'<span class="outcome {style}">{escape(text or outcome)}</span>' if style else ""
 
 
 def swatch(number: int) -> str:
-    """Show a law's colour as a small square."""
+    """Return a small square in a law's colour."""
     return f'<span class="swatch" style="background:{colour(number)}"></span>'
 
 
 def code(text: str) -> str:
-    """Show a text to be typed, escaped; a click selects all of it."""
+    """Return a text to be typed, escaped; a click selects all of it."""
     return f'<code class="copy">{escape(text)}</code>' if text else ""
 
 
 def note(text: str) -> str:
-    """Show a text as a note, escaped; nothing where it is empty."""
+    """Return a text as a note, escaped; "" where it is empty."""
     return f'<p class="note">{escape(text)}</p>' if text else ""
 
 
 def write_table(table: Table, path: Path) -> None:
-    """Write a table with all digits, units in the header; a missing value is an empty cell, blanks separate components."""
+    """Write a table as CSV with all digits and units in the header; missing values are empty cells, and spaces separate
+    components."""
     with atomic_write(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([table.heads(), *(map(cell, row) for row in table.rows)])
 
 
 def cell(value: Any) -> str:
-    """Write a value with all digits."""
+    """Return a value as text with all digits."""
     if value is None or isinstance(value, str):
         return value or ""
     return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())

@@ -1,4 +1,4 @@
-"""Numbers, times and gains for reading."""
+"""Numbers, times and gains as text for readers."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 ROUNDING = 1e-13
-"""Entries below this share of a matrix's largest count as rounding errors."""
+"""Entries below this share of a matrix's largest entry count as rounding errors."""
 
 
 def number_text(value: Any, digits: int = 6) -> str:
-    """Show a number, vector or matrix for reading: a diagonal matrix by its diagonal, equal numbers as one, a name
-    unchanged. An entry that is only a rounding error compared with the largest reads as 0."""
+    """Return a number, vector or matrix as text: a diagonal matrix by its diagonal, equal numbers as one, a name unchanged.
+    Entries that are only rounding errors compared with the largest are shown as 0."""
     if isinstance(value, str):
         return value
     array = np.asarray(value, dtype=float)
@@ -42,20 +42,20 @@ def _row_text(row: Any, digits: int) -> str:
 
 
 def value_text(value: Any, unit: str) -> str:
-    """Show a value with its unit."""
+    """Return a value with its unit."""
     return number_text(value) if unit == "1" else f"{number_text(value)} {unit}"
 
 
 def left_text(flight: Flight, certificate: int, kind: str) -> str:
-    """Describe how a flight leaves a claim of one of its certificates; empty if it does not."""
+    """Return a text on when and how a flight leaves a claim of one of its certificates; "" if it does not."""
     left, moment = flight.left(certificate, kind), flight.metric_set.moment
     groups = {time: _how([one.how for one in left if one.time == time]) for time in (one.time for one in left)}
     return "; ".join(f"{'from the start' if time == 0.0 else f'at {moment(time, 4)}'} {how}" for time, how in groups.items())
 
 
 def covered_text(flight: Flight, certificate: int) -> str:
-    """State between which times the claim of a certificate about the loop as it flies covers a flight, where it does not
-    cover it from the start; empty where it does, and where it covers nothing of it."""
+    """Return a text on the times between which a certificate's claim about the loop as it flies covers a flight; "" where it
+    covers it from the start, or not at all."""
     from starhold.certification.wording import listed
 
     times, moment = flight.covered[certificate] if flight.covered else (), flight.metric_set.moment
@@ -67,8 +67,8 @@ def covered_text(flight: Flight, certificate: int) -> str:
 
 
 def unflown_text(certificate: Certificate) -> tuple[str, str]:
-    """Return, in a word and in a sentence, why no claim of a certificate is about the loop as it flies; both are empty where
-    one is."""
+    """Return, in a word and in a sentence, why a certificate has no claim about the loop as it flies; both "" where it has
+    one."""
     from starhold.certification.certificate import NOT_SOUGHT
 
     why = certificate.unflown
@@ -78,8 +78,8 @@ def unflown_text(certificate: Certificate) -> tuple[str, str]:
 
 
 def _how(departures: Sequence[str]) -> str:
-    """List departures in order of time, naming the parts of the loop together."""
-    # Loaded here, for what draws needs no certificates.
+    """Return a list of departures in order of time, with the parts of the loop named together."""
+    # Imported here, because modules that draw need no certificates.
     from starhold.certification.assumptions import HAS
     from starhold.certification.wording import enumerated, listed
 
@@ -89,18 +89,18 @@ def _how(departures: Sequence[str]) -> str:
 
 
 def unknown_text(flight: Flight) -> str:
-    """List recorded quantities of a flight that stop being finite before its end; empty where none do."""
+    """Return a text on recorded quantities of a flight that cease to be finite before its end; "" if there are none."""
     spans = [f"{name} from {flight.metric_set.moment(time)} on" for name, time in flight.unknown.items()]
-    return f"{flight.name}: no number to the end: {', '.join(spans)}" if spans else ""
+    return f"{flight.name}: not finite up to the end: {', '.join(spans)}" if spans else ""
 
 
 def lost_text(flight: Flight, digits: int = 6) -> str:
-    """Show the time at which a flight diverged; empty if it did not."""
+    """Return the time at which a flight diverged as text; "" if it did not."""
     return "" if flight.lost is None else flight.metric_set.moment(flight.lost, digits)
 
 
 def plain_measure(name: str, unit: str, meaning: str = "") -> Measure:
-    """Return how a quantity is shown if only its SI unit is known; angles in degrees."""
+    """Return the measure that shows a quantity of which only the SI unit is known; angles are shown in degrees."""
     heading = name.replace("_", " ")
     if unit == "rad" or unit.startswith("rad/"):
         return Measure(heading, f"deg{pretty_unit(unit[3:])}", meaning, 180.0 / math.pi)
@@ -108,5 +108,5 @@ def plain_measure(name: str, unit: str, meaning: str = "") -> Measure:
 
 
 def pretty_unit(unit: str) -> str:
-    """Show a unit with raised exponents."""
+    """Return a unit with superscript exponents."""
     return unit.replace("^2", "²").replace("^3", "³")

@@ -1,4 +1,4 @@
-"""Labels of ticks as plain text, because matplotlib's parser of formulas takes longer than the rest of a figure."""
+"""Tick labels as plain text, because matplotlib's math parser takes longer than the rest of a figure."""
 
 import re
 from typing import Any
@@ -7,11 +7,11 @@ from matplotlib.ticker import LogFormatterSciNotation, ScalarFormatter
 
 RAISED = str.maketrans("0123456789-−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁻")
 POWERS = (-2, 4)
-"""Labels beyond these powers of ten have their power above the axis."""
+"""The powers of ten beyond which labels show their common power above the axis."""
 
 
 def as_text(formula: str) -> str:
-    """Return the plain text of a tick's formula: 10⁻³ for $\\mathdefault{10^{-3}}$."""
+    """Return a tick's formula as plain text: 10⁻³ for $\\mathdefault{10^{-3}}$."""
     raised = re.sub(r"\^\{([-−0-9]+)\}", lambda power: power[1].translate(RAISED), formula)
     return re.sub(r"\$|\\mathdefault|[{}]", "", raised).replace(r"\times", "×")
 
@@ -24,7 +24,7 @@ class Even(ScalarFormatter):
         self.set_powerlimits(POWERS)
 
     def get_offset(self) -> str:
-        """Return the power of ten that stands above the axis."""
+        """Return the power of ten shown above the axis."""
         self.set_useMathText(True)
         try:
             return as_text(super().get_offset())

@@ -1,4 +1,4 @@
-"""How well a flight kept real time: numbers and a histogram."""
+"""The timing of a flight in real time, as numbers and a histogram."""
 
 import json
 from pathlib import Path
@@ -12,19 +12,19 @@ from starhold.report.plots import COLOURS
 from starhold.report.results import TIMING
 
 LEAST = 1e-6
-"""The histogram begins at this time (s), and counts shorter ones there."""
+"""The lower end (s) of the histogram; shorter times are counted there."""
 BINS = 60
 
 
 def write_timing(timing: dict[str, Any], folder: Path) -> Path:
-    """Write `Served.timing` into a folder, as JSON and as a picture, and return the picture's path."""
+    """Write `Served.timing` into a folder, as JSON and as a figure, and return the figure's path."""
     numbers, picture = (folder / name for name in TIMING)
     write_text(numbers, json.dumps(timing, allow_nan=False) + "\n")
     return save(draw_timing(timing), picture)
 
 
 def draw_timing(timing: dict[str, Any]) -> Any:
-    """Draw the latencies of the commands and the lateness of the plant, as histograms over one axis of decades."""
+    """Return a figure with histograms of the commands' latencies and of the plant's delays, over one logarithmic axis."""
     title = f"Real time: {timing['periods']} periods of {1e3 * timing['period']:.4g} ms, {timing['missed']} missed"
     figure, grid = framed((8.0, 4.6), title, 2, 1, (0.75, 0.2, 0.55, 0.5), sharex=True, hspace=0.12)
     shown = {"from readings to command": timing["latencies"], "the plant's own lateness": timing["lateness"]}

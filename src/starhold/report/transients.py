@@ -9,13 +9,13 @@ from starhold.studies.flight import Flight
 
 
 def transient_text(flight: Flight) -> str:
-    """Summarize in a line a flight with such metrics."""
+    """Return one line about the transient of a flight."""
     time, rate, accelerations, fate = _cells(flight)
     return f"transient {time}; peak rate {rate}; peak acceleration {accelerations}: {fate}"
 
 
 def section(flights: Sequence[Flight]) -> str:
-    """Write the section of the page; empty where no limits were given."""
+    """Return the section of the page as HTML; "" where no limits were given."""
     if not all("limits_kept" in flight.metrics for flight in flights):
         return ""
     cells_of = [(number, flight, *_cells(flight)) for number, flight in enumerate(flights)]
@@ -26,7 +26,7 @@ def section(flights: Sequence[Flight]) -> str:
 
 def _cells(flight: Flight) -> tuple[str, str, str, str]:
     metrics = flight.metrics
-    time = "comes to no end" if metrics["transient_time"] is None else f"{metrics['transient_time']:.4g} s"
+    time = "does not end" if metrics["transient_time"] is None else f"{metrics['transient_time']:.4g} s"
     accelerations = ", ".join(f"{math.degrees(x):.4g}" for x in metrics["peak_accelerations"])
     return (
         time,

@@ -1,4 +1,4 @@
-"""Scenarios, from files or made in Python. Called, this package is `make_scenario`, for `sh.scenario({...})`."""
+"""Scenarios from files or from Python. The package is callable: `sh.scenario({...})` calls `make_scenario`."""
 
 import sys
 from types import ModuleType

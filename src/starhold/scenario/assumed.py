@@ -1,4 +1,4 @@
-"""Numbers of sensors that estimators assume are those of the sensors, where an estimator's table does not state its own."""
+"""An estimator assumes the parameters of the sensors in its loop, such as their noise, unless its own table states them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from starhold.parts.part import Fitted
 
 
 def with_assumed(parts: Sequence[Fitted], tables: Sequence[Mapping[str, Any]]) -> tuple[Fitted, ...]:
-    """Return the parts of raw tables with these numbers."""
+    """Return the parts with the assumed sensor parameters filled in; tables: the raw table of each part."""
     made: list[Fitted] = []
     for fitted, table in zip(parts, tables, strict=True):
         added: dict[str, Any] = {}
@@ -24,7 +24,7 @@ def with_assumed(parts: Sequence[Fitted], tables: Sequence[Mapping[str, Any]]) -
 
 
 def is_assumed(parts: Sequence[Fitted], tables: Sequence[Mapping[str, Any]], place: int, key: str) -> bool:
-    """Whether an estimator assumes this number of the part at a place, because its table does not state its own."""
+    """Return whether an estimator assumes the parameter `key` of the sensor `parts[place]`, not stated in its own table."""
     return any(
         key in keys and parts[place] in sensors and (key if parts[place] is sensors[0] else more) not in table
         for fitted, table in zip(parts, tables, strict=True)
@@ -33,8 +33,8 @@ def is_assumed(parts: Sequence[Fitted], tables: Sequence[Mapping[str, Any]], pla
 
 
 def _assumed(fitted: Fitted, parts: Sequence[Fitted]) -> list[tuple[tuple[str, ...], str, list[Fitted]]]:
-    """The keys that an estimator may leave to sensors, the key of a row for each sensor after the first, and those that
-    have them all."""
+    """Return, for each reading, the keys that an estimator may take from sensors, its key for the rows of the second and
+    further sensors, and the sensors, all of which have these keys."""
     module, listed = fitted.part.module, list[tuple[tuple[str, ...], str, list[Fitted]]]()
     for reading, keys in getattr(module, "ASSUMES", {}).items():
         sensors = [one for one in parts if one.part.role == "sensor" and reading in one.part.module.Reading._fields]

@@ -10,8 +10,8 @@ from starhold.scenario.reading import LawEntry, Scenario
 
 
 def build(scenario: Scenario, entry: LawEntry, drawn: bool = False) -> ClosedLoop:
-    """Build the closed loop of one law of a scenario. InputError where the law cannot work with its gains, the integration
-    cannot follow the loop, or, unless its numbers are drawn, a condition of a mode can never hold."""
+    """Return the closed loop of one law of a scenario. InputError where the law cannot work with its gains, the integration
+    cannot resolve the loop, or, unless its numbers are drawn, a condition of a mode can never hold."""
     loop = scenario.hooks.build(scenario, entry)
     check_fit(loop, scenario.where)
     if not drawn:

@@ -1,5 +1,5 @@
-"""The [campaign] table of a scenario: the distributions of keys, and the number of runs. Numbers in the unit of another key,
-such as the bounds of a distribution, stay as in the file; the package `campaign` reads them with those keys' units.
+"""The [campaign] table of a scenario: distributions of keys, and the number of runs. Parameters in the unit of another key,
+such as the bounds of a distribution, stay as in the file; the package `campaign` converts them.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ MOST_RUNS = 10**9
 
 
 class CampaignTable(Table):
-    """Many runs with numbers drawn from distributions, judged by the requirements whose method is "campaign"."""
+    """Many runs with numbers drawn from distributions, judged by the requirements with method = "campaign"."""
 
-    runs: Annotated[int, *quantity(Gain("1", at_least=1, at_most=MOST_RUNS, whole=True, text="of each law"))] = 10_000
-    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of the draws"))] = 1
+    runs: Annotated[int, *quantity(Gain("1", at_least=1, at_most=MOST_RUNS, whole=True, text="runs of each law"))] = 10_000
+    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="seed of the draws"))] = 1
     sampling: Annotated[
         Literal["random", "sobol", "latin-hypercube", "morris", "saltelli"],
-        Field(description="how the draws are placed; the last two for sensitivity indices of the inputs"),
+        Field(description="sampling method; the last two give sensitivity indices of the inputs"),
     ] = "random"
-    metrics: list[str] = Field(default=[], description="measured beside the usual ones: overshoot, iterations")
+    metrics: list[str] = Field(default=[], description="further metrics to measure: overshoot, iterations")
     over: dict[str, Dispersed] = Field(default={}, description="distributions by key")
 
     @model_validator(mode="before")

@@ -1,4 +1,4 @@
-"""Checks the contents of a scenario file: every error becomes one line."""
+"""Checks the contents of a scenario file and reports every error in one line."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ RENAMED = {
     "known": "judged_apart",
     "l2-rest": "l2-equilibrium",
 }
-"""Old names of keys, laws and built-in scenarios, refused with the new one named where that one is known."""
+"""New names of renamed keys, laws and built-in scenarios; the error for an old name states the new one where it applies."""
 MOST_SUBSTEPS = 10**6
-"""The most substeps in a control period, which ends before an interrupt is heeded."""
+"""The most substeps in a control period; an interrupt takes effect only between control periods."""
 
 
 LONGEST_TEXT, DEEPEST, MOST_DIGITS = 2**22, 16, 60
 """The most characters of a file, nested tables and lists, and digits of a whole number."""
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{50}}")
-"""A dotted key so long that the time to read it, which grows as the square of its length, matters."""
+"""Matches a dotted key of more than 50 parts: the time to read it grows as the square of its length."""
 
 
 def read_toml(text: str, where: str) -> dict[str, Any]:
@@ -68,7 +68,7 @@ def read_toml(text: str, where: str) -> dict[str, Any]:
 
 
 def _in_words(value: Any) -> Any:
-    """Return the value with TOML's dates and times as strings, which keys of an epoch accept and others refuse."""
+    """Return the value with TOML dates and times as strings, which only the keys of epochs accept."""
     if isinstance(value, dict):
         return {name: _in_words(item) for name, item in cast(dict[str, Any], value).items()}
     if isinstance(value, list):
@@ -77,7 +77,7 @@ def _in_words(value: Any) -> Any:
 
 
 def _check_sizes(tables: dict[str, Any], where: str) -> None:
-    """Raise InputError where anything is nested too deeply, or a whole number is far beyond the range of floats."""
+    """Raise InputError where tables or lists are nested too deeply, or a whole number has too many digits."""
     left: list[tuple[int, str, Any]] = [(0, "", tables)]
     while left:
         depth, key, value = left.pop()
@@ -93,7 +93,7 @@ def _check_sizes(tables: dict[str, Any], where: str) -> None:
 
 
 def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
-    """Return the law tables of a file with their keys in errors; InputError where there is none."""
+    """Return the law tables of a file, each with its key in errors. InputError where there is none."""
     if not isinstance(laws, list) or not laws:
         given = "no law" if laws is None else show(laws)
         raise InputError(where, "law", given, "at least one [[law]] table")
@@ -103,8 +103,8 @@ def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
 def pick_law(
     data: Any, known: Mapping[str, Law], body: str, folder: Path, where: str, key: str
 ) -> tuple[dict[str, Any], Law, str | None]:
-    """Return a law table with its type, the law of that type or from the table's `file`, which is relative to a folder, and
-    its form; known: the installed laws for the body of this name."""
+    """Return a law's raw table with its type filled in, the law of that type or from the table's `file` (relative to
+    `folder`), and the design form or None; known: the installed laws for the body of this name."""
     if not isinstance(data, dict):
         raise InputError(where, key, show(data), "a [[law]] table")
     table = cast(dict[str, Any], data)
@@ -153,8 +153,8 @@ def _law_in(table: dict[str, Any], known: Mapping[str, Law], body: str, folder: 
 
 
 def in_file(table: Mapping[str, Any], read: Callable[[Path], _Part], what: str, folder: Path, where: str, key: str) -> _Part:
-    """Return the law, body or other part (`what` in errors) that `read` finds in the `file` of a raw table, named `key` in
-    errors. InputError where there is none, or where a file may not use its name."""
+    """Return the law, body or other part (`what` in errors) that `read` reads from the `file` of a raw table, named `key` in
+    errors. InputError where it cannot be read, or its name is taken."""
     given, key = table["file"], f"{key}.file"
     if not isinstance(given, str):
         raise InputError(where, key, show(given), 'the name of a Python file, such as "mine.py"')
@@ -173,14 +173,14 @@ def in_file(table: Mapping[str, Any], read: Callable[[Path], _Part], what: str, 
 
 
 def make_gains(law: Law, values: list[Any], spec: Any, craft: Any, where: str, key: str) -> Any:
-    """Return the gains themselves, or those of a design from its inputs `spec`."""
+    """Return the gains: the values given, or those that the design form computes from its inputs `spec`."""
     with refusing(law, where, key):
         return law.gains(*values) if spec is None else law.design(craft, spec)
 
 
 @contextmanager
 def refusing(law: Law, where: str, key: str) -> Generator[None]:
-    """Turn a law's ValueError into an InputError, and any exception of a law from a file."""
+    """Turn a law's ValueError into an InputError; for a law from a file, any exception."""
     try:
         yield
     except InputError:
@@ -196,8 +196,8 @@ def refusing(law: Law, where: str, key: str) -> Generator[None]:
 
 
 def try_law(loop: Any, where: str, key: str) -> None:
-    """Raise InputError where the loop's law fails, with the line of its file: it is called once, in plain Python, which runs
-    every line."""
+    """Call the loop's law once in plain Python, which runs every line. InputError, with the line of its file, where it fails
+    or returns values of the wrong form."""
     law = loop.law
     with refusing(law, where, key):
         carry, setup = loop.carry(), loop.setup()
@@ -221,7 +221,7 @@ def refuse_unstable(check: Callable[[], None], where: str, key: str) -> None:
 
 
 def free_name(given: str | None, kind: str, taken: set[str], where: str, key: str) -> str:
-    """Return the name of a law, by default its type; names in a file differ."""
+    """Return the name of a law, by default its type. InputError where another law of the file has this name."""
     if given is None:
         counted = (kind if n == 1 else f"{kind}-{n}" for n in range(1, len(taken) + 2))
         return next(name for name in counted if name not in taken)
@@ -231,12 +231,12 @@ def free_name(given: str | None, kind: str, taken: set[str], where: str, key: st
 
 
 RESOLVED = 0.5
-"""Substeps are at most this part of the shortest time constant: beyond it the classical fourth-order method loses digits,
+"""The largest substep as a share of the shortest time constant: above it the classical fourth-order method loses accuracy,
 and from 2.8 on it is unstable."""
 
 
 def check_substeps(loop: Any, where: str) -> None:
-    """Raise InputError where the integration cannot follow the fastest part."""
+    """Raise InputError where the substeps are too long for the fastest part."""
     fastest = loop.fastest
     if fastest is None:
         return
@@ -254,7 +254,7 @@ def check_substeps(loop: Any, where: str) -> None:
 def validate(
     model: type[_Model], data: Any, where: str, prefix: str, extra: Iterable[str] = (), context: Any = None
 ) -> _Model:
-    """Return a table validated by the model; `extra`: further known keys, `context`: for the model's validators. InputError
+    """Return a table validated by the model; `extra`: further allowed keys, `context`: the validators' context. InputError
     for the first error."""
     try:
         return model.model_validate(data, context=context)
@@ -265,8 +265,8 @@ def validate(
 def _translate(
     error: ValidationError, model: type[BaseModel], data: Any, where: str, prefix: str, extra: list[str]
 ) -> InputError:
-    """Return the first error that pydantic reports, in starhold's words."""
-    # Unknown keys first: a misspelt key is the reason that the right one is missing.
+    """Return the first error that pydantic reports as an InputError."""
+    # Unknown keys first: a misspelt key is often the reason why a required one is missing.
     fault = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
     place = [f"[{part + 1}]" if isinstance(part, int) else part for part in fault["loc"]]
     context: dict[str, Any] = fault.get("ctx", {})
@@ -288,7 +288,7 @@ def _translate(
 
 
 def _quoted(part: str) -> str:
-    """Return a key as TOML writes it where it contains dots or a comma, as the keys of [campaign.over] do."""
+    """Return a key, quoted as in TOML where it contains dots or a comma, as keys of [campaign.over] do."""
     return f'"{part}"' if {".", ","} & set(part) else part
 
 
@@ -315,12 +315,12 @@ def show(value: Any) -> str:
 
 
 def cut(text: str, most: int = 60) -> str:
-    """Return a text, cut where it is too long for a line."""
+    """Return a text, shortened to `most` characters."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def nearest(word: str, known: list[str]) -> str:
-    """Return the new name of a renamed word, else the nearest known word, else all of them."""
+    """Return a hint for an unknown word: the new name of a renamed one, else the nearest known word, else all of them."""
     if (new := RENAMED.get(word)) in known:
         return f"{new}, its new name"
     near = difflib.get_close_matches(word[:100], known, n=1, cutoff=0.6)

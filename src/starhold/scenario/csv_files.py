@@ -7,8 +7,8 @@ from starhold.files import read_text
 
 
 def csv_lines(path: Path) -> list[tuple[int, list[str]]]:
-    """The lines of a CSV file that are neither empty nor comments: their numbers, and their cells without spaces around.
-    Raises OSError, or ValueError where it is no CSV file."""
+    """Return the lines of a CSV file that are neither empty nor comments: each line's number and its stripped cells. Raises
+    OSError, or ValueError where the file is not CSV."""
     try:
         rows = [(k, [cell.strip() for cell in row]) for k, row in enumerate(csv.reader(read_text(path).splitlines()), 1)]
     except csv.Error as error:
@@ -17,7 +17,7 @@ def csv_lines(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def number_in(text: str) -> float | None:
-    """Return the number in a cell of a CSV file; None for words."""
+    """Return the number in a cell of a CSV file, or None if it is not a number."""
     try:
         return float(text)
     except ValueError:

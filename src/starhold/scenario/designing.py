@@ -1,4 +1,4 @@
-"""The gains of a scenario's laws from design formulas, with figures of merit."""
+"""The gains that design forms give to a scenario's laws, with figures of merit."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from starhold.scenario.reading import LawEntry, Scenario
 
 @dataclass(frozen=True, repr=False)
 class Design:
-    """One designed law: its name in the scenario, its type, its form, the form's inputs and the resulting gains (SI, by
-    their names in files and in `starhold laws`; a diagonal matrix as the three numbers on its diagonal), and figures by
-    their names in `starhold design`: numbers, or arrays such as P (6, 6), rate first."""
+    """One designed law: its name in the scenario, its type and form, the form's inputs and the resulting gains (SI, by
+    their keys in files; a diagonal matrix as its three diagonal entries), and figures of merit by their names in `starhold
+    design`: numbers, or arrays such as P (6, 6) with the rate first."""
 
     name: str
     law: str
@@ -34,8 +34,8 @@ class Design:
 
 
 def design(scenario: Scenario, law: str | None = None) -> list[Design]:
-    """Return every designed law of a scenario, or the one of this name. InputError where there is none, or where its figures
-    cannot be computed."""
+    """Return the designs of all laws of a scenario that have a form, or of the law of this name. InputError where there is
+    none, or where its figures of merit cannot be computed."""
     entries = scenario.laws if law is None else (scenario.pick(law),)
     designed = [_design(scenario, entry, entry.form) for entry in entries if entry.form is not None]
     if not designed:
@@ -57,13 +57,13 @@ def _design(scenario: Scenario, entry: LawEntry, form: str) -> Design:
 
 
 def written(items: Iterable[Field], values: Iterable[Any]) -> dict[str, Any]:
-    """Return values by name, as in a file."""
+    """Return values by the names of their fields, as in a file."""
     return {item.name: item.written(value) for item, value in zip(items, values, strict=True)}
 
 
 def map_inputs(scenario: Scenario, law: str | None = None) -> tuple[Any, float, float, float]:
-    """Return the numbers for a map of the decay rate: inertia ratios, scaled angle and rate, budget; of the first law
-    designed for it. InputError where there is none."""
+    """Return the inputs for a map of the decay rate: inertia ratios, scaled angle, scaled rate and torque budget of the
+    first law designed for a degree of stability. InputError where there is none."""
     entries = scenario.laws if law is None else (scenario.pick(law),)
     for entry in entries:
         teller = getattr(entry.law.module, "map_inputs", None)

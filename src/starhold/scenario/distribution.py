@@ -1,7 +1,7 @@
-"""The interface of distributions: uniform numbers go in and values come out, so that random, Sobol and Latin hypercube
-samples serve all of them alike. Parameters stay as in the file until `read` replaces them by numbers in the units of a key.
-Every `draw` takes uniforms u (dims, n) strictly between 0 and 1 and returns values (width, n), each a function of its own
-column of u alone, to the last bit: so a campaign may be cut into chunks anywhere.
+"""The interface of distributions. Each maps uniform numbers to values, so random, Sobol and Latin hypercube samples work
+with all of them. Parameters stay as in the file until `read` replaces them by numbers in the key's unit.
+Every `draw` takes uniforms u (dims, n) strictly between 0 and 1 and returns values (width, n). Each value depends, to the
+last bit, only on its own column of u, so a campaign may be split into chunks anywhere.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ Array: TypeAlias = NDArray[np.float64]
 SYMMETRIC = 1e-9
 """A matrix counts as symmetric if it differs from its transpose by at most this share of its largest entry."""
 DISTRIBUTIONS: dict[str, type[Distribution]] = {}
-"""The classes by the names of their distributions."""
+"""The classes of distributions by name."""
 
 
 class Distribution(Table):
-    """One key, or several that are drawn together."""
+    """The distribution of one key, or of several keys that are drawn together."""
 
     WORDS: ClassVar[bool] = False
     """Whether values may be words, booleans and dates."""
@@ -40,10 +40,10 @@ class Distribution(Table):
 
     judged_apart: Annotated[
         Flag,
-        Field(description="known before flight, as the day of a launch: runs of similar values are judged by themselves"),
+        Field(description="known before flight, such as the launch date: runs of similar values are judged separately"),
     ] = False
     known_to_law: Annotated[
-        Flag, Field(description="laws know each drawn value and are designed for it; else for the file's value")
+        Flag, Field(description="whether laws know and are designed for the drawn value, not the file's")
     ] = False
 
     @classmethod
@@ -53,15 +53,15 @@ class Distribution(Table):
 
     @classmethod
     def named(cls, flag: str) -> str:
-        """Return the names of distributions with a flag, as errors list them."""
+        """Return the names of the distributions with a flag, as listed in errors."""
         return " or ".join(name for name, kind in DISTRIBUTIONS.items() if getattr(kind, flag))
 
     DIMS: ClassVar[int] = 1
-    """Return the number of uniforms of a draw, where it does not depend on the parameters."""
+    """The number of uniforms per draw, where it does not depend on the parameters."""
 
     @property
     def dims(self) -> int:
-        """The number of uniforms of a draw."""
+        """The number of uniforms per draw."""
         return self.DIMS
 
     @property
@@ -71,7 +71,7 @@ class Distribution(Table):
 
     @property
     def independent(self) -> bool:
-        """Whether each uniform determines a number of its own."""
+        """Whether each drawn number depends on a different uniform."""
         return False
 
     @property
@@ -80,11 +80,12 @@ class Distribution(Table):
         return getattr(self, "relative", False)
 
     def read(self, keys: Sequence[KeyReading]) -> Self:
-        """Return the distribution with its parameters as numbers for its keys. InputError where they are impossible."""
+        """Return the distribution with its parameters converted to numbers in the units of its keys. InputError where they
+        are impossible."""
         return self.model_copy(update=self._numbers(*keys))
 
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
-        """The numbers by parameter."""
+        """Return the numbers by the names of the parameters."""
         return {}
 
     @abstractmethod
@@ -92,48 +93,49 @@ class Distribution(Table):
         """Return values (width, n) for uniforms (dims, n)."""
 
     def size(self, rows: Sequence[Array]) -> tuple[str, Array] | None:
-        """A name and a function of the drawn numbers (n,) that may matter more than the numbers themselves, or None."""
+        """Return the name and values (n,) of a function of the drawn components that may explain results better than each
+        component does, such as their norm; or None."""
         return None
 
 
 class Relative(Distribution):
-    """One whose numbers may be shares."""
+    """A distribution whose parameters may be shares of the file's value."""
 
     relative: Annotated[Flag, Field(description="the numbers are shares of the file's value")] = False
 
 
 class Spread(Relative):
-    """A distribution that is drawn for each component by itself, or once for all; each parameter has a number for each,
-    (width,)."""
+    """A distribution that is drawn for each component separately, or once for all components; each parameter holds a number
+    per component, (width,)."""
 
-    together: Annotated[Flag, Field(description="all components move together, by one draw")] = False
+    together: Annotated[Flag, Field(description="whether one draw moves all components")] = False
     _width: int = PrivateAttr(1)
     _whole: bool = PrivateAttr(False)
 
     def read(self, keys: Sequence[KeyReading]) -> Self:
-        """The distribution with its numbers."""
+        """Return the distribution with its parameters as numbers."""
         reading = super().read(keys)
         reading._width, reading._whole = len(keys[0].index), keys[0].place.whole
         return reading
 
     @property
     def dims(self) -> int:
-        """One for each number, unless they move together."""
+        """One uniform per component, or a single one if they move together."""
         return 1 if self.together else self._width
 
     @property
     def independent(self) -> bool:
-        """Whether they do not move together."""
+        """Whether the components are drawn separately."""
         return self.dims == self._width
 
 
 def column(numbers: Sequence[float]) -> Array:
-    """Numbers (n,) as a column (n, 1)."""
+    """Return numbers (n,) as a column (n, 1)."""
     return np.array(numbers, dtype=np.float64)[:, None]
 
 
 def ndtri(u: Array) -> Array:
-    """The quantiles of the normal distribution."""
+    """Return the standard normal quantiles of probabilities u, in an array of the same shape."""
     from scipy import special
 
     return special.ndtri(u)

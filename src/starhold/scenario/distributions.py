@@ -1,5 +1,5 @@
-"""Distributions of the numbers that differ between runs of a campaign, one class each: its table in a file, how its key's
-values are read, and its inverse distribution function. A class is found by its field `distribution`; no other code names it.
+"""The distributions of dispersed numbers. Each class is one distribution: its table in a file, the conversion of its
+parameters, and its inverse distribution function. Its field `distribution` gives its name; no other code names it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Uniform(Spread):
-    """The uniform distribution between two values; for whole numbers both ends are included."""
+    """The uniform distribution between two values, both included for whole numbers."""
 
     WHOLE = BOUNDED = True
     distribution: Literal["uniform"]
@@ -35,11 +35,11 @@ class Uniform(Spread):
         return _ordered(key, key.numbers("low"), key.numbers("high"))
 
     def draw(self, u: Array) -> Array:
-        """Return numbers in proportion to the uniforms."""
+        """Return the numbers at the fraction u of the interval between the two values."""
         low, high = column(self.low), column(self.high)
         if self._whole:
             return np.minimum(low + np.floor((high - low + 1.0) * u), high)
-        # Rounding may exceed an end, and the key may refuse that.
+        # Rounding may exceed a bound, which the key may refuse.
         return np.clip(low + (high - low) * u, low, high)
 
 
@@ -54,7 +54,7 @@ class Normal(Spread):
         return {"mean": key.centre("mean"), "sigma": key.sigma(key.unit)}
 
     def draw(self, u: Array) -> Array:
-        """mean + sigma z."""
+        """Return mean + sigma z, with z the normal quantiles of the uniforms."""
         return column(self.mean) + column(self.sigma) * ndtri(u)
 
 
@@ -87,13 +87,14 @@ class TruncatedNormal(Spread):
 
     @property
     def bounded(self) -> bool:
-        """Whether neither end is infinite."""
+        """Whether both bounds are finite."""
         return bool(np.isfinite([*self.low, *self.high]).all())
 
     @cached_property
     def _tails(self) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Return whether each is reflected about its mean, and the probabilities below its ends afterwards. In the upper
-        tail these are too near one to be distinguished, so an interval there is reflected into the lower tail."""
+        """For each component, whether its interval is reflected about the mean, and the probabilities below its two
+        ends after that. In the upper tail these are too close to one, so an interval there is reflected to the lower
+        tail."""
         from scipy.special import ndtr
 
         mean, sigma, low, high = (column(numbers) for numbers in (self.mean, self.sigma, self.low, self.high))
@@ -104,7 +105,7 @@ class TruncatedNormal(Spread):
 
     @property
     def reached(self) -> bool:
-        """Whether each interval has a probability that floats can hold."""
+        """Whether the probability of every interval is large enough for floats."""
         _, below, above = self._tails
         return bool((above - below > 0.0).all())
 
@@ -131,7 +132,7 @@ class LogNormal(Spread):
         return {"median": median, "sigma": key.sigma("1")}
 
     def draw(self, u: Array) -> Array:
-        """median exp(sigma z)."""
+        """Return median exp(sigma z), with z the normal quantiles of the uniforms."""
         return column(self.median) * np.exp(column(self.sigma) * ndtri(u))
 
 
@@ -156,14 +157,14 @@ class Choice(Relative):
         return {"values": values, "weights": weights}
 
     def draw(self, u: Array) -> NDArray[Any]:
-        """Return the value whose part of the interval from 0 to 1 contains the uniform."""
+        """Return the value whose subinterval of [0, 1], of length in proportion to its weight, contains the uniform."""
         ends = np.cumsum(np.array(self.weights, dtype=float))
         return np.array(self.values).T[:, np.searchsorted(ends[:-1] / ends[-1], u[0], side="right")]
 
 
 class CorrelatedNormal(Relative):
-    """Gauss's distribution of several numbers together: of the keys that commas divide, or of one vector or matrix; of a
-    symmetric one those on and above the diagonal, row by row."""
+    """The joint normal distribution of several numbers: of keys separated by commas, or of one vector or matrix. Of a
+    symmetric matrix the numbers on and above the diagonal are drawn, row by row."""
 
     SEVERAL = True
     distribution: Literal["correlated-normal"]
@@ -172,7 +173,7 @@ class CorrelatedNormal(Relative):
     correlation: Annotated[Any, *raw("correlations, a row for each number")] = None
     covariance: Annotated[Any, *raw("covariances (SI), a row for each number, in place of sigma and correlation")] = None
     _factor: Any = PrivateAttr(())
-    """Return the rows of the lower triangular L with the covariance L L^T."""
+    """The rows of the lower triangular L; L L^T is the covariance."""
 
     @model_validator(mode="after")
     def _one_matrix(self) -> CorrelatedNormal:
@@ -185,11 +186,12 @@ class CorrelatedNormal(Relative):
 
     @property
     def dims(self) -> int:
-        """One for each number."""
+        """One uniform per number."""
         return len(self.mean)
 
     def read(self, keys: Sequence[KeyReading]) -> Self:
-        """Return the distribution with its numbers, for the vector of one key, or for keys of one number each."""
+        """Return the distribution with its parameters as numbers, for one key that is a vector or matrix, or for several
+        keys that are numbers."""
         first = keys[0]
         if any(bool(key.place.shape) != (len(keys) == 1) for key in keys):
             allowed = "numbers of several keys, or the vector or matrix of one"
@@ -206,7 +208,7 @@ class CorrelatedNormal(Relative):
         return reading
 
     def _each(self, keys: Sequence[KeyReading], name: str, checked: bool = True) -> tuple[float, ...]:
-        """Return a number for each of several keys, or for each component of one vector."""
+        """Return the parameter `name` for each of several keys, or for each component of one."""
         if len(keys) == 1:
             return keys[0].numbers(name, checked)
         given = getattr(self, name)
@@ -216,9 +218,9 @@ class CorrelatedNormal(Relative):
         return tuple(key.read(item, f"{name}[{number}]", checked)[0] for number, (key, item) in pairs)
 
     def draw(self, u: Array) -> Array:
-        """mean + L z."""
+        """Return mean + L z, with z the normal quantiles of the uniforms."""
         z, values = ndtri(u), np.empty_like(u)
-        # Term by term: how a matrix product adds depends on its width.
+        # Term by term, because the order of summation of a matrix product depends on its width.
         for place, (mean, row) in enumerate(zip(self.mean, self._factor, strict=True)):
             total = np.full(u.shape[1], mean)
             for other in range(place + 1):
@@ -243,13 +245,14 @@ class Rotations(Distribution):
         return {}
 
     def draw(self, u: Array) -> Array:
-        """Return a rotation about an axis, then one that takes the axis to a point of the sphere."""
+        """Return quaternions (4, n): a random turn about one axis, followed by a rotation of that axis to a random point of
+        the sphere."""
         near, far = np.sqrt(1.0 - u[0]), np.sqrt(u[0])
         first, second = math.tau * u[1], math.tau * u[2]
         return np.stack([far * np.cos(second), near * np.sin(first), near * np.cos(first), far * np.sin(second)])
 
     def size(self, rows: Sequence[Array]) -> tuple[str, Array]:
-        """The angle of the rotation."""
+        """Return the name and values (n,) of the rotation angle."""
         return "angle", 2.0 * np.arccos(np.minimum(np.abs(rows[0]), 1.0))
 
 
@@ -263,7 +266,7 @@ class Shell(Relative):
 
     @property
     def shares(self) -> bool:
-        """Never, because shares of a norm have become norms."""
+        """False, because `read` has converted shares to norms."""
         return False
 
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
@@ -273,12 +276,13 @@ class Shell(Relative):
         if not 0.0 <= low < high:
             raise key.place.refuse("low", show(self.low), f"from 0 to below high, which is {show(self.high)}")
         size = math.hypot(*key.nominal) if self.relative else 1.0
-        # One direction represents all.
+        # The key is tested with vectors in one direction only.
         key.accept([high * size, 0.0, 0.0], "high")
         return {"low": low * size, "high": high * size}
 
     def draw(self, u: Array) -> Array:
-        """Draw a radius by its cube, a height on the unit sphere (Archimedes) and a longitude."""
+        """Return vectors (3, n) from uniforms for the cube of the radius, the height on the unit sphere (Archimedes) and the
+        longitude."""
         hollow = (self.low / self.high) ** 3
         radius = np.clip(self.high * np.cbrt(hollow + u[0] * (1.0 - hollow)), self.low, self.high)
         height, longitude = 2.0 * u[1] - 1.0, math.tau * u[2]
@@ -286,19 +290,19 @@ class Shell(Relative):
         return radius * np.stack([level * np.cos(longitude), level * np.sin(longitude), height])
 
     def size(self, rows: Sequence[Array]) -> tuple[str, Array]:
-        """The norm of the vector."""
+        """Return the name and values (n,) of the vector's norm."""
         return "norm", np.sqrt(sum(np.square(row) for row in rows))
 
 
 def _ordered(key: KeyReading, low: Sequence[float], high: Sequence[float]) -> dict[str, Any]:
-    """Return the ends by name. InputError where the lower is not below the upper."""
+    """Return the bounds by name. InputError where low is not below high."""
     if not all(a < b for a, b in zip(low, high, strict=True)):
         raise key.place.refuse("low", show(key.table.low), f"below high, which is {show(key.table.high)}")
     return {"low": low, "high": high}
 
 
 def _positive(key: KeyReading, given: Any, size: int, name: str) -> Array:
-    """Return a matrix of correlations or covariances. InputError where it is not one."""
+    """Return a correlation or covariance matrix (size, size). InputError where it is not symmetric positive definite."""
     allowed = f"{size} rows of {size} plain numbers"
     try:
         matrix = np.array(given, dtype=float)
@@ -332,11 +336,11 @@ def _read(given: Any) -> Distribution:
     try:
         return validate(DISTRIBUTIONS[name], dict(table), "", "")
     except InputError as error:
-        # Raised again by the enclosing table, which knows the rest of the key.
+        # The enclosing table raises it again with the full key.
         raise told_at(error.key, error.given, error.allowed) from None
 
 
 Dispersed: TypeAlias = Annotated[
     Any, BeforeValidator(_read), WithJsonSchema({"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]})
 ]
-"""Return the table of one dispersion, by its distribution."""
+"""The table of one dispersion, validated by the class that its `distribution` names."""

@@ -1,10 +1,10 @@
-"""Orbits in files give an orbit's start: mean elements, two lines (TLE) or an orbit mean-elements message (OMM), by SGP4; an
-orbit ephemeris message (OEM) by interpolation.
+"""Initial states of orbits from files: mean elements, as two lines (TLE) or an orbit mean-elements message (OMM), by SGP4;
+an orbit ephemeris message (OEM) by interpolation.
 
 SGP4 (Hoots and Roehrich 1980; Vallado et al. 2006), of the package `sgp4`, gives position and velocity in axes of the true
-equator and the mean equinox (TEME), which are turned to the mean equator and equinox of date.
+equator and the mean equinox (TEME), which are rotated to the mean equator and equinox of date.
 
-From there on the scenario's own motion is flown: `say_distance` warns how far it departs from the file's.
+From this state on, the scenario's own motion is flown; `say_distance` warns how far it departs from that of the file.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ BESIDE = ("epoch", "ephemeris")
 FRAMES = (OF_J2000, "ICRF", "GCRF", OF_DATE, "TEME")
 """Reference frames of an ephemeris that are read. ICRF and GCRF are treated as EME2000, from which they differ by 0.02"."""
 NEAREST = 6
-"""States of an ephemeris between which it is interpolated."""
+"""The number of states from which a state of an ephemeris is interpolated."""
 OLD = 14.0
-"""Days from the elements' epoch beyond which their error, some km a day, is worth a warning."""
+"""Days from the epoch of mean elements after which their error, some km per day, causes a warning."""
 SHOWN = 64
-"""Instants of a flight at which its orbit is compared with SGP4's."""
+"""The number of instants at which the flown orbit is compared with the file's."""
 ALLOWED = {
     "tle": "a text file of one satellite's two lines of 69 characters, with or without a name above",
     "omm": "an orbit mean-elements message of one satellite, as .xml, .csv, .json, or keyword = value",
@@ -53,7 +53,7 @@ ALLOWED = {
 
 
 class ElementSet(NamedTuple):
-    """The mean elements of a file: its name, the two lines, or the fields of a message and their values."""
+    """The mean elements of a file: its name, and either the two lines or the fields of a message by keyword."""
 
     file: str
     lines: tuple[str, ...] = ()
@@ -61,7 +61,7 @@ class ElementSet(NamedTuple):
     motion = "SGP4's orbit"
 
     def satellite(self) -> Any:
-        """The satellite as `sgp4` has it. ValueError or KeyError for elements that it cannot read."""
+        """The satellite, an object of `sgp4`. ValueError or KeyError for elements that cannot be read."""
         record = import_module("sgp4.api").Satrec
         if self.lines:
             return record.twoline2rv(*self.lines)
@@ -75,8 +75,8 @@ class ElementSet(NamedTuple):
         return date_of(import_module("sgp4.conveniences").sat_epoch_datetime(self.satellite()))
 
     def state(self, epoch: Date, later: float = 0.0) -> tuple[Vector, Vector]:
-        """Position (m) and velocity (m/s) `later` seconds after an epoch (UTC), in the mean equator and equinox of that
-        epoch. ValueError where SGP4 has none."""
+        """Return position (m) and velocity (m/s) `later` seconds after an epoch (UTC), in the mean equator and equinox of
+        that epoch. ValueError where SGP4 fails."""
         days = days_of(epoch)
         error, position, velocity = self.satellite().sgp4(2451545.0, days + later / 86400.0)
         if error:
@@ -92,15 +92,15 @@ class ElementSet(NamedTuple):
 
 
 class Ephemeris(NamedTuple):
-    """The states of a file: its name, the reference frame, the epoch of the first state, and of each the time since (s),
-    position (m) and velocity (m/s)."""
+    """The states of a file: its name, the reference frame, the epoch of the first state, and for each state the time since
+    then (s), the position (m) and the velocity (m/s)."""
 
     file: str
     frame: str
     first: str
     rows: tuple[tuple[float, ...], ...]
     begins: tuple[int, ...] = (0,)
-    """The rows with which segments begin."""
+    """The index of the first state of each segment."""
     motion = "the ephemeris"
 
     @property
@@ -114,12 +114,12 @@ class Ephemeris(NamedTuple):
         return self.rows[-1][0]
 
     def state(self, epoch: Date, later: float = 0.0) -> tuple[Vector, Vector]:
-        """Position (m) and velocity (m/s) `later` seconds after an epoch (UTC), in the mean equator and equinox of that
-        epoch: the polynomial through the nearest positions and velocities. ValueError where there are no states."""
+        """Return position (m) and velocity (m/s) `later` seconds after an epoch (UTC), in the mean equator and equinox of
+        that epoch, from the polynomial through the nearest states. ValueError outside the time span of the states."""
         from scipy.interpolate import KroghInterpolator
 
         time = (instant_of(iso_text(epoch)) - instant_of(self.first)) / SECOND + later
-        # Days are floats, and know an instant to a microsecond.
+        # Days are floats, which resolve an instant to a microsecond.
         if not -1e-5 <= time <= self.last + 1e-5:
             side = "before the first" if time < 0.0 else "after the last"
             raise ValueError(f"{date_text(epoch)} is {side} state of {self.file}")
@@ -129,7 +129,7 @@ class Ephemeris(NamedTuple):
         times = np.array([row[0] for row in segment])
         begin = int(np.clip(np.searchsorted(times, time) - NEAREST // 2, 0, max(len(times) - NEAREST, 0)))
         rows = np.array(segment[begin : begin + NEAREST])
-        # Each time twice: with the position, and with its derivative.
+        # Each time twice: for the position and for its derivative.
         nodes, values = np.repeat(rows[:, 0] - time, 2), rows[:, 1:].reshape(-1, 3)
         interpolated = KroghInterpolator(nodes, values).derivatives(0.0, der=2)
         days = days_of(epoch)
@@ -139,8 +139,8 @@ class Ephemeris(NamedTuple):
 
 
 def with_orbit(data: Mapping[str, Any], folder: Path, where: str) -> Mapping[str, Any]:
-    """Raw tables of a scenario with the state that the file has which [orbit] names. InputError for a file that holds no
-    orbit of its kind."""
+    """Return a scenario's raw tables with the position and velocity from the file that [orbit] names, if any. InputError
+    where the file cannot be read or has no state at the epoch."""
     table = data.get("orbit")
     kind = next((kind for kind in KINDS if isinstance(table, dict) and kind in table), None)
     if kind is None or not isinstance(table, dict):
@@ -180,7 +180,7 @@ def with_orbit(data: Mapping[str, Any], folder: Path, where: str) -> Mapping[str
 
 
 def say_distance(scenario: Scenario) -> None:
-    """Warn how far the flown motion departs from that of the file that [orbit] names, if it names one."""
+    """Warn how far the flown motion departs from the motion in the file that [orbit] names, if any."""
     orbit = getattr(scenario.table, "orbit", None)
     kind = next((kind for kind in KINDS if getattr(orbit, kind, None) is not None), None)
     if orbit is None or kind is None:
@@ -193,14 +193,14 @@ def say_distance(scenario: Scenario) -> None:
         return
     pushing = [f for f in scenario.parts if f.part.hook("acceleration") or f.part.hook("push")]
     pushing = [f for f in pushing if getattr(f.params, "moves_orbit", 1)]
-    # The others need more than a position.
+    # Only forces that depend on the position alone are included.
     movers = [fit("environment", "two-body"), *(f for f in pushing if f.part.hook("perturbation"))]
     left = [f.called for f in pushing if f not in movers]
     times = np.linspace(0.0, covered, SHOWN)
     followed = np.array([source.state(orbit.epoch, float(t))[0] for t in times])
     far = 1e-3 * float(np.linalg.norm(_flown(scenario, movers, times) - followed, axis=1).max())
     more = f" with {' and '.join(f.called for f in movers[1:])}" if movers[1:] else ""
-    said = f"orbit.{kind}: two-body motion{more} from its state comes to lie {far:.3g} km from {source.motion}"
+    said = f"orbit.{kind}: two-body motion{more} from this state departs by {far:.3g} km from {source.motion}"
     said += f" in {covered:.6g} s"
     said += ", where it ends" if covered < duration else ""
     said += f", without {' and '.join(left)}" if left else ""
@@ -209,7 +209,7 @@ def say_distance(scenario: Scenario) -> None:
 
 
 def _flown(scenario: Scenario, movers: list[Any], times: Any) -> Any:
-    """The positions (n, 3; m) at times (n,) (s) of the motion by forces that depend on the position alone."""
+    """Return positions (n, 3; m) at times (n,) (s) of the motion under forces that depend only on the position."""
     from scipy.integrate import solve_ivp
 
     craft, forces = scenario.made.craft, [(f.part.module.acceleration, f.prepared(1.0)) for f in movers]
@@ -224,7 +224,7 @@ def _flown(scenario: Scenario, movers: list[Any], times: Any) -> Any:
 
 
 def _two_lines(path: Path) -> ElementSet:
-    """The two lines of a file. ValueError says which line is wrong, and why."""
+    """Return the two lines in a file. ValueError says which line is wrong, and why."""
     rows = [(number, line.rstrip()) for number, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
     pair = [(number, line) for number, line in rows if re.match(r"[12] ", line)]
     if [line[0] for _, line in pair] != ["1", "2"] or len(rows) > 3:
@@ -242,7 +242,7 @@ def _two_lines(path: Path) -> ElementSet:
 
 
 def _message(path: Path) -> ElementSet:
-    """The fields of a message. ValueError, KeyError or SyntaxError for another file."""
+    """Return the mean elements in a message. ValueError, KeyError or SyntaxError where the file is not such a message."""
     text, omm = read_text(path), import_module("sgp4.omm")
     parsers = {".xml": omm.parse_xml, ".csv": omm.parse_csv}
     if path.suffix in parsers:
@@ -262,7 +262,7 @@ def _message(path: Path) -> ElementSet:
 
 
 def _ephemeris(path: Path) -> Ephemeris:
-    """The states of a message. ValueError for another file, and for one that is not about the Earth in UTC."""
+    """Return the states in a message. ValueError for another file, and for a message not about the Earth or not in UTC."""
     oem: Oem = parse_oem(path)
     for key, given, allowed in (
         ("CENTER_NAME", oem.center.upper(), ("EARTH",)),

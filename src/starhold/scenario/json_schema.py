@@ -10,7 +10,7 @@ from starhold.scenario.schema import LawTable, law_model
 
 
 def json_schema() -> dict[str, Any]:
-    """Return a JSON Schema of scenario files of every body, for completion and checks in editors."""
+    """Return a JSON Schema of scenario files for every body, with which editors complete and check them."""
     known = [_file_schema(body) for body in (*bodies().values(), *others())]
     shared: dict[str, Any] = {}
     for schema in known:
@@ -51,7 +51,7 @@ def _law_schemas(body: Body, base: type[LawTable], known: dict[str, Any]) -> lis
     ):
         table = model.model_json_schema()
         known.update(table.pop("$defs", {}))
-        # TOML tables name their type, though pydantic has a default for it.
+        # A TOML table must state its type, although pydantic has a default for it.
         table["required"] = sorted({"type", *table.get("required", [])} | ({"form"} & set(table["properties"])))
         tables.append(table)
     shared = base.model_json_schema()
@@ -65,7 +65,7 @@ def _law_schemas(body: Body, base: type[LawTable], known: dict[str, Any]) -> lis
 
 def part_schemas(body: str, shared: tuple[str, ...]) -> list[dict[str, Any]]:
     """Return JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file;
-    shared: keys of its scenarios that give parameters to all parts."""
+    shared: scenario keys that set parameters of all parts."""
     schemas = [part_model(part, shared).model_json_schema() for part in installed().values() if part.body in ("", body)]
     for table in schemas:
         table["required"] = sorted({"type", *table.get("required", [])})

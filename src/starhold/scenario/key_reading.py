@@ -1,4 +1,4 @@
-"""The table of one key's dispersion, read as numbers for the key."""
+"""Reads the table of one key's dispersion as numbers in the key's unit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Numbers: TypeAlias = tuple[float, ...]
 
 
 def components(shape: tuple[int, ...], symmetric: bool = False) -> list[tuple[int, ...]]:
-    """Return the indices of the numbers of an array, row by row; for a symmetric one those on and above the diagonal."""
+    """Return the indices of an array's entries, row by row; of a symmetric matrix those on and above the diagonal."""
     every = [tuple(map(int, index)) for index in np.ndindex(shape)]
     return [index for index in every if index[0] <= index[1]] if symmetric else every
 
@@ -35,7 +35,7 @@ class KeyReading:
 
     @staticmethod
     def of(scenario: Scenario, place: Place, table: Any) -> KeyReading:
-        """Raise InputError where such a key cannot have values of the distribution."""
+        """Return the reading of a key's table. InputError where the key cannot have values of the distribution."""
         relative, value = getattr(table, "relative", False), place.value
         for holds, flag, what in (
             (place.wordy, "WORDS", "a word"),
@@ -59,12 +59,12 @@ class KeyReading:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names of the components."""
+        """The names of the drawn components."""
         return tuple(self.place.key + "".join(f"[{n + 1}]" for n in item) for item in self.index)
 
     @property
     def nominal(self) -> tuple[Any, ...]:
-        """The numbers or the word of the file, by component; NaN where it has none."""
+        """The file's value of each drawn component, a number or a word; NaN where it has none."""
         value = self.place.value
         if self.place.wordy:
             return (word(value),)
@@ -76,7 +76,7 @@ class KeyReading:
         return tuple(float(full[item]) for item in self.index)
 
     def centre(self, name: str, checked: bool = True) -> Numbers:
-        """Return a mean or a median, by default the file's value."""
+        """Return the parameter `name`, a mean or a median, by default the file's value."""
         value = self.place.value
         if getattr(self.table, name) is not None:
             return self.numbers(name, checked)
@@ -85,20 +85,21 @@ class KeyReading:
         return (1.0,) * len(self.index) if self.relative else self.nominal
 
     def numbers(self, name: str, checked: bool = True) -> Numbers:
-        """Return the numbers of a parameter in the key's unit, or as shares; `checked`: whether the key must accept them.
-        InputError where it does not."""
+        """Return the numbers of a parameter in the key's unit, or as shares. InputError where `checked` is true and the key
+        would not accept them."""
         return self.read(getattr(self.table, name), name, checked)
 
     def norm(self, name: str) -> float:
-        """Return the number of a parameter of a whole vector."""
+        """Return a parameter that is one number for the whole vector, in the key's unit or as a share."""
         return float(width_at(replace(self.place, shape=()), getattr(self.table, name), name, self.unit))
 
     def accept(self, value: Any, name: str) -> Any:
-        """Return the validated form of a value. InputError, with this name, where the key does not accept it."""
+        """Return the validated value. InputError about the parameter `name` where the key does not accept it."""
         return accepted(self.scenario, self.place, value, name)
 
     def read(self, raw: Any, name: str, checked: bool = True) -> tuple[Any, ...]:
-        """Return the numbers, or the word, of a raw value with this name in errors; `checked` as in `numbers`."""
+        """Return the numbers or the word that a raw value stands for; `name`: its name in errors; `checked` as in
+        `numbers`."""
         if self.place.wordy:
             return (word(self.accept(raw, name)),)
         if self.place.gain == EPOCH and isinstance(raw, str):
@@ -112,8 +113,8 @@ class KeyReading:
         return self.picked(read)
 
     def sigma(self, unit: str | None) -> Numbers:
-        """Return standard deviations in a unit, None for the key's. InputError where one is negative, or nothing is
-        dispersed."""
+        """Return standard deviations in `unit`, or for None in the key's. InputError where one is negative, or all are
+        zero."""
         raw, scale = self.table.sigma, self.nominal if self.relative else (1.0,) * len(self.index)
         widths = self.picked(width_at(self.place, raw, "sigma", unit))
         if min(widths) < 0.0 or not any(share * size for share, size in zip(widths, scale, strict=True)):
@@ -130,7 +131,7 @@ def word(value: Any) -> Any:
 
 
 def is_symmetric(place: Place) -> bool:
-    """Whether a key holds a symmetric matrix."""
+    """Return whether a key holds a symmetric matrix."""
     if len(place.shape) != 2 or place.value is None:
         return False
     array = np.array(place.value)

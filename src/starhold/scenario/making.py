@@ -22,17 +22,17 @@ _PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """Return the scenario with other values at these keys, with their names in errors, "spacecraft.inertia" or
-    "law[2].k_rate", and for laws and parts also by name, "law.pd.k_rate"; None removes a key, a table or a law."""
+    """Return the scenario with other values of some keys. Keys are written as in errors, "spacecraft.inertia" or
+    "law[2].k_rate", and in laws and parts also by name, "law.pd.k_rate"; None removes a key, a table or a law."""
     return next(variants(scenario, [changes]))
 
 
 def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[Scenario]:
-    """Yield the scenario with each change in turn; errors name the change."""
+    """Yield the scenario with each set of changes in turn; errors name the changes."""
     names = names_of(scenario)
     tables = read_toml(scenario.text, scenario.where)
     for change in changes:
-        # Short enough for one line: only the first of many changes.
+        # To fit on one line, errors show only the first of many changes.
         described = ", ".join(f"{key} = {show(value)}" for key, value in list(change.items())[:4])
         described = " ".join(described.split()).encode(errors="backslashreplace").decode()
         where = f"{scenario.where} with {described}" if described else scenario.where
@@ -46,18 +46,18 @@ def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterat
 
 
 def names_of(scenario: Scenario) -> dict[str, list[str]]:
-    """Return the names of laws and parts, by the arrays of their tables."""
+    """Return the names of laws and of parts, by the names of their arrays of tables."""
     return {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
 
 
 def path_of(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[str | int]:
-    """Return the path of a key of `with_`: names of tables and keys, and indices in lists from 0; `names`: those of laws and
-    parts, by the arrays of their tables. InputError where it is not a key."""
+    """Return the path of a key of `with_`: names of tables and keys, and indices in lists from 0; `names`: the result of
+    `names_of`. InputError where it is not a key."""
     if not isinstance(key, str):
         raise InputError(where, show(key), "a key that is not a string", 'keys such as "spacecraft.inertia"')
     array, dot, rest = key.partition(".")
     if dot and array in names:
-        # The longest first, because names may contain dots.
+        # The longest name first, because names may contain dots.
         for name in sorted(names[array], key=len, reverse=True):
             if rest == name or rest.startswith(f"{name}."):
                 after = rest[len(name) + 1 :]
@@ -74,7 +74,7 @@ def path_of(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[st
 
 
 def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, validated: Any) -> None:
-    """Put a value into raw tables; validated: tables whose defaults supply vectors that the file leaves out."""
+    """Put a value into raw tables; validated: the validated tables, which supply vectors that the file leaves out."""
     here: Any = tables
     seen = ""
     for part, after in zip(path, [*path[1:], None], strict=True):
@@ -100,8 +100,8 @@ def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, validat
 
 
 def plain(value: Any, where: str, key: str) -> Any:
-    """Return the value in types of TOML; InputError where that is impossible."""
-    # Without the module loaded there is no rotation.
+    """Return the value converted to types of TOML. InputError where this is impossible."""
+    # Unless this module is loaded, the value cannot be a rotation.
     transform: Any = sys.modules.get("scipy.spatial.transform")
     if transform is not None and isinstance(value, transform.Rotation):
         return cast(Any, value).as_quat(scalar_first=True).tolist()

@@ -1,4 +1,4 @@
-"""Laws of modes are read: a [[law]] of the type "modes" with [[law.mode]] tables."""
+"""Reads laws that consist of modes: a [[law]] of the type "modes" with [[law.mode]] tables."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Read(NamedTuple):
-    """A law's table read: the law, the design form and its inputs (None where the gains are given), and the gains."""
+    """The contents of a law's table: the law, the design form and its inputs (None where gains are given), and the gains."""
 
     law: Law
     form: str | None
@@ -43,15 +43,14 @@ class Read(NamedTuple):
     targets: tuple[Fitted, ...] = ()
     """The targets of a law's modes where these have their own, one each."""
     slews: tuple[Slew | None, ...] = ()
-    """How each of them is reached as its mode begins."""
+    """The slew by which each target is reached when its mode begins."""
 
 
 def read_gains(
     data: Any, scenario: Scenario, context: Any, key: str, base: type[LawTable] | None = None, whole: Any = None
 ) -> Read:
-    """The law of a raw table, called `key` in errors, for a scenario that as yet has none. base: the keys of such tables
-    beside the gains, by default those of the body; whole: the table, read already, that holds a body's own keys in its
-    place."""
+    """Return the law of a raw table, called `key` in errors, for a scenario without laws as yet. base: the model of the keys
+    besides gains, by default the body's; whole: the validated table that holds these keys instead, for a mode's table."""
     body, where, craft = scenario.hooks, scenario.where, scenario.craft
     table, law, form = pick_law(data, body.laws(), body.name, scenario.folder, where, key)
     declared, shared = law.fields(form), scenario.table.shared
@@ -68,14 +67,14 @@ def read_gains(
 
 
 class Clock(NamedTuple):
-    """The epoch of a flight, if it has one, and when it ends (s)."""
+    """The epoch of a flight, if any, and its end (s since the start)."""
 
     epoch: Date | None
     end: float
 
 
 def _read_time(gain: Gain) -> Annotations:
-    """The annotations of a time since the start, or a date."""
+    """Return the annotations for a time since the start or a date."""
     read = reader(gain)
 
     def moment(value: Any) -> Any:
@@ -87,9 +86,11 @@ def _read_time(gain: Gain) -> Annotations:
 
 
 class _Condition(Table):
-    """Another mode begins when all tests have held for a time."""
+    """A condition: another mode begins when all its tests have held for a time."""
 
-    to: Annotated[str | None, Field(description="the mode that begins; until: the next, back: the one before")] = None
+    to: Annotated[str | None, Field(description="the mode that begins; by default the next, of back the previous one")] = (
+        None
+    )
     after: Annotated[float, *quantity(AFTER)] = 0.0
     dwell: Annotated[float, *quantity(DWELL)] = 0.0
 
@@ -115,28 +116,28 @@ class _Condition(Table):
 
     @property
     def tests(self) -> tuple[str, ...]:
-        """The names of its tests."""
+        """The names of the condition's tests."""
         return tuple(test for test in TESTS if getattr(self, test) is not None)
 
     def levels(self, clock: Clock, where: str, key: str) -> list[Any]:
-        """The levels of its tests and their further numbers. InputError for a date where the flight has none, or before it
-        begins, and for times of which one excludes the other."""
+        """Return the levels of the tests and their other parameters. InputError for a date where the flight has no epoch,
+        for times outside the flight, and for not_after before not_before."""
         times = {test: _since(getattr(self, test), clock, where, f"{key}.{test}") for test in TIMES if test in self.tests}
         if len(times) == len(TIMES) and times["not_before"] > times["not_after"]:
             given = f"a time {times['not_before'] - times['not_after']:g} s before not_before"
-            raise InputError(where, f"{key}.not_after", given, "a later one, for nothing is both")
+            raise InputError(where, f"{key}.not_after", given, "a later one, because no time meets both")
         settings = {name: getattr(self, name) for name in settings_of(self.tests)}
         filled = {name: SETTINGS[name].default if value is None else value for name, value in settings.items()}
         return [*(times.get(test, getattr(self, test)) for test in self.tests), *filled.values()]
 
 
 def _about(key: str, tests: Iterable[str]) -> list[str]:
-    """The tests that have a use for a further number."""
+    """Return those of the tests that need the parameter `key`."""
     return [test for test in tests if key in settings_of([test])]
 
 
 def _since(given: Any, clock: Clock, where: str, key: str) -> float:
-    """A time (s) since the start."""
+    """Return a time or a date in seconds since the start. InputError where it is outside the flight."""
     time, named = given, f"{given:g} s" if isinstance(given, float) else iso_text(given)
     if not isinstance(given, float):
         if clock.epoch is None:
@@ -162,49 +163,47 @@ else:
 
 
 CONDITIONS = ("until", "back")
-"""The keys of conditions."""
+"""The keys of a mode's conditions."""
 
 
 class ModeTable(LawTable):
     """The keys of every mode's table besides its law's own gains."""
 
-    name: Annotated[Name, Field(description="how switches, recordings and certificates call it")]  # pyright: ignore
+    name: Annotated[Name, Field(description="its name in switches, recordings and certificates")]  # pyright: ignore
     target: Annotated[
         Any,
         WithJsonSchema({"type": "object"}),
-        Field(description="as [target], or a [[part]] of this role; [target] if absent"),
+        Field(description="table as of [target] or of a target's [[part]]; [target] if absent"),
     ] = None
-    slew: Annotated[
-        SlewTable | None, Field(description="turn by which the target is reached as the mode begins; none if absent")
-    ] = None
+    slew: Annotated[SlewTable | None, Field(description="slew to the target when the mode begins; none if absent")] = None
     effectors: Annotated[
         tuple[str, ...] | None,
-        Field(description="those that work, of all that take commands or act from outside; all if absent"),
+        Field(description="effectors active in this mode, of those with commands or external torques; all if absent"),
     ] = None
     until: Annotated[Condition | None, Field(description="when the next mode begins")] = None
-    back: Annotated[Condition | None, Field(description="when the mode before begins again")] = None
+    back: Annotated[Condition | None, Field(description="when the previous mode begins again")] = None
 
 
 @cache
 def modes_model(base: type[LawTable]) -> type[LawTable]:
-    """The table of a law of modes, but for its modes; base: the keys of a body's law tables."""
+    """Return the model of the table of a law of modes, without its modes; base: the model of the body's law tables."""
     entries: dict[str, Any] = {
         "type": (Literal[NAME], NAME),
-        "on_loss": (Annotated[str | None, Field(description="the mode that begins where a loss is noticed")], None),
+        "on_loss": (Annotated[str | None, Field(description="the mode that begins when a loss is detected")], None),
         "wheels_lost": (Annotated[float | None, *quantity(replace(WHEELS_LOST, whole=True))], None),
-        "monitor": (Annotated[list[MonitorTable], Field(description="what else counts as a loss")], []),
+        "monitor": (Annotated[list[MonitorTable], Field(description="monitors whose trip also counts as a loss")], []),
     }
     return create_model("Modes", __base__=base, __doc__="A law for each mode.", **entries)
 
 
 def has_modes(data: Any, body: Body) -> bool:
-    """Whether a raw table is that of a law of modes."""
+    """Return whether a raw table is that of a law of modes."""
     return isinstance(data, dict) and cast(Any, data).get("type") == NAME and body.modes
 
 
 def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
-    """The law of a raw table with [[law.mode]] tables, called `key` in errors. InputError for the first mode that is wrong,
-    or that none leads to."""
+    """Return the law of a raw table with [[law.mode]] tables, called `key` in errors. InputError for the first mode that is
+    wrong or cannot be reached."""
     where = scenario.where
     rest = {name: value for name, value in data.items() if name != "mode"}
     table: Any = validate(modes_model(scenario.hooks.law_table), rest, where, key, ["mode"], context)
@@ -240,7 +239,7 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
 
 
 def _mode_on_loss(table: Any, names: list[str], where: str, key: str) -> int | None:
-    """The mode that begins on a loss, counted from 0; None for none."""
+    """Return the index of the mode that begins on a loss; None if there is none."""
     if table.on_loss is None:
         unused = next((name for name in ("wheels_lost", "monitor") if getattr(table, name)), None)
         if unused is not None:
@@ -254,7 +253,7 @@ def _mode_on_loss(table: Any, names: list[str], where: str, key: str) -> int | N
 def _targets(
     reads: Sequence[Read], slews: Sequence[Slew | None], scenario: Scenario, context: Any, key: str
 ) -> tuple[Fitted, ...]:
-    """The target of each mode; none where no mode has its own and none is reached by a slew."""
+    """Return the target of each mode; an empty tuple where no mode has a target or a slew."""
     given: list[Any] = [read.table.target for read in reads]
     if all(one is None for one in (*given, *slews)):
         return ()
@@ -265,7 +264,7 @@ def _targets(
 def _joined(
     tables: Sequence[Any], reads: Sequence[Read], on_loss: int | None, clock: Clock, where: str, key: str
 ) -> tuple[list[Mode], list[Any]]:
-    """The modes with their switches, and the numbers of all of them."""
+    """Return the modes with their switches, and the numbers of all of them."""
     names: list[str] = [table.name for table in tables]
     modes, gains = list[Mode](), list[Any]()
     last = max(place for place in range(len(names)) if place != on_loss)
@@ -274,7 +273,7 @@ def _joined(
         if names.index(table.name) < place:
             raise InputError(where, f"{here}.name", show(table.name), "a name that no other mode of the law has")
         if table.until is None and place not in (last, on_loss):
-            raise InputError(where, f"{here}.until", "nothing", "a condition, for only the last mode may fly to the end")
+            raise InputError(where, f"{here}.until", "nothing", "a condition, because only the last mode may fly to the end")
         gains += read.gains
         switches: list[Switch] = []
         for way, beside in zip(CONDITIONS, (place + 1, place - 1), strict=True):
@@ -297,11 +296,11 @@ def _joined(
 
 
 def _to(given: str | None, names: list[str], place: int, beside: int, where: str, key: str) -> int:
-    """The mode that a condition leads to."""
+    """Return the index of the mode that begins on a condition."""
     if given is None:
         if not 0 <= beside < len(names):
             raise InputError(
-                where, f"{key}.to", "nothing", f"the name of a mode, for none is {'after' if beside else 'before'} it"
+                where, f"{key}.to", "nothing", f"the name of a mode, because none is {'after' if beside else 'before'} it"
             )
         return beside
     others = [name for name in names if name != names[place]]

@@ -1,4 +1,4 @@
-"""The [[law.monitor]] tables of a law of modes are read: what each monitor looks at, with the unit of that."""
+"""Reads the [[law.monitor]] tables of a law of modes, with the unit of the quantity that each monitor checks."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ if TYPE_CHECKING:
 
 
 class MonitorTable(Table):
-    """A monitor of a reading or of an estimate, on whose trip the mode on_loss begins."""
+    """A monitor of a reading or an estimate; when it trips, the mode `on_loss` begins."""
 
-    name: Annotated[Name, Field(description="how errors call it")]
-    kind: Annotated[Literal["range", "rate", "stuck", "residual"], Field(description="what it looks at")]
+    name: Annotated[Name, Field(description="its name in errors")]
+    kind: Annotated[Literal["range", "rate", "stuck", "residual"], Field(description="property that it checks")]
     reading: Annotated[str | None, Field(description="the name of a sensor's reading")] = None
-    estimate: Annotated[str | None, Field(description="in its place the name of what the estimator computes")] = None
-    sensor: Annotated[str | None, Field(description="the name of the sensor; the first of such a reading if absent")] = None
-    limit: Annotated[
-        Any, *raw("beyond which it trips, in the unit of what it looks at; of a rate per second, of stuck a time")
-    ]
+    estimate: Annotated[str | None, Field(description="in its place the name of an estimated quantity")] = None
+    sensor: Annotated[str | None, Field(description="the name of the sensor; the first with this reading if absent")] = None
+    limit: Annotated[Any, *raw("limit beyond which it trips, in the quantity's unit; per second for rate, a time for stuck")]
     times: Annotated[int, *quantity(replace(TIMES, whole=True))] = 1
-    modes: Annotated[list[str] | None, Field(description="the modes in which it looks; all if absent", min_length=1)] = None
+    modes: Annotated[list[str] | None, Field(description="the modes in which it is active; all if absent", min_length=1)] = (
+        None
+    )
 
 
 def read_monitor(
     table: MonitorTable, modes: Sequence[str], scenario: Scenario, where: str, key: str
 ) -> tuple[Monitor, list[float]]:
-    """The monitor of a table with its numbers, in a law whose modes have these names. InputError where the scenario has no
-    such reading or estimate, the law no such mode, or a limit has another unit."""
+    """Return the monitor of a table with its numbers, in a law whose modes have these names. InputError where the scenario
+    has no such reading or estimate, the law has no such mode, or the limit is in the wrong unit."""
     unknown = next((name for name in table.modes or () if name not in modes), None)
     if unknown is not None:
         raise InputError(where, f"{key}.modes", show(unknown), nearest(unknown, [*modes]))
@@ -60,7 +60,7 @@ def read_monitor(
         watched, given = table.reading, _sensors_of(table.reading, scenario)
         names = [fitted.called for fitted in given]
         if table.sensor is not None and table.sensor not in names:
-            allowed = nearest(table.sensor, names) if names else f"none, for no sensor gives {watched}"
+            allowed = nearest(table.sensor, names) if names else f"none, because no sensor gives {watched}"
             raise InputError(where, f"{key}.sensor", show(table.sensor), allowed)
         sensor = 0 if table.sensor is None else names.index(table.sensor)
     what = "estimate" if sensor is None else "reading"
@@ -85,22 +85,22 @@ def read_monitor(
 
 
 SIZES = {"quaternion": 4, "axis": 3, "": 1}
-"""How many numbers a quantity of each dimension has."""
+"""The number of components of a quantity of each dimension."""
 
 
 def _known(fitted: Iterable[Fitted]) -> dict[str, Quantity]:
-    """The quantities that these sensors or estimators give, by name."""
+    """Return the quantities that these sensors or estimators give, by name."""
     known: dict[str, Quantity] = {}
     for part in (one.part for one in fitted):
         kind = part.module.Estimate if part.role == "estimator" else part.module.Reading
-        # What is not recorded declares no units; it has those of the body's state.
+        # Quantities that are not recorded declare no units; they have those of the body's state.
         kinds = quantities(kind if part.role == "estimator" or is_recorded(part) else Sample)
         known |= {name: one for name, one in kinds.items() if name in kind._fields and one.dimension in SIZES}
     return known
 
 
 def _sensors_of(reading: str, scenario: Scenario) -> list[Fitted]:
-    """The sensors that give a reading, in the order in which a loop has them."""
+    """Return the sensors that give a reading, in the order of the loop."""
     noise = getattr(scenario.table, "sensor", None)
     short = [fit("sensor", "gaussian", 0.0, 0.0)] if noise is not None and any(dict(noise).values()) else []
     sensors = [*short, *(fitted for fitted in scenario.parts if fitted.part.role == "sensor")]
@@ -108,4 +108,4 @@ def _sensors_of(reading: str, scenario: Scenario) -> list[Fitted]:
 
 
 def _one_of(name: str, known: Mapping[str, Any], what: str) -> str:
-    return nearest(name, list(known)) if known else f"none, for no {what}"
+    return nearest(name, list(known)) if known else f"none, because no {what}"

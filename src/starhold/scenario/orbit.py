@@ -1,4 +1,4 @@
-"""The table of an orbit, by position and velocity or by elements, and the checks that refuse one."""
+"""The [orbit] table, with position and velocity or elements, and the checks of the orbit."""
 
 from __future__ import annotations
 
@@ -25,25 +25,24 @@ DENSEST = 1e6
 LOWEST = 1.0 / 64.0
 """Plain altitudes below this share of the body's radius need a unit: for the Earth, below 100 km."""
 AIR = 5e4
-"""Altitude (m) below which nothing orbits the Earth; any altitude up to geostationary, a thousand times too small, is below
-it."""
+"""Altitude (m) below which nothing orbits the Earth. Altitudes up to geostationary that were given in km are below it."""
 FARTHEST = 4e8
-"""Plain altitude (m) about the Earth above which the unit is taken to be wrong."""
+"""Plain altitude (m) above the Earth beyond which the unit is assumed to be wrong."""
 FASTEST = 10.0
-"""The ratio of speed to the escape speed of the Sun, a planet or the Moon above which the unit is taken to be wrong."""
+"""The ratio of speed to the escape speed of the Sun, a planet or the Moon above which the unit is assumed to be wrong."""
 STRAIGHT = 1e-9
-"""The sine of the angle between position and velocity below which a path is taken to pass through the centre."""
-ANGLE_UP = Gain("rad", at_least=0.0, at_most=math.pi, text="of the orbit's plane against the first two axes")
+"""The sine of the angle between position and velocity below which an orbit counts as passing through the centre."""
+ANGLE_UP = Gain("rad", at_least=0.0, at_most=math.pi, text="angle between the orbit's plane and the first two axes")
 ANGLES = ("inclination", "raan", "argument_of_perigee", "true_anomaly")
 
 
 def too_dense(gravity: float, distance: float) -> bool:
-    """Return whether any body with this gravitational parameter (m3/s2) is too large for an orbit at this distance (m)."""
+    """Return whether a body with this gravitational parameter (m3/s2) inside this distance (m) would be too dense."""
     return gravity > DENSEST * NEWTON * 4.0 / 3.0 * math.pi * distance**3
 
 
 def check_gravity(key: str, gravity: float) -> None:
-    """Raise an error where a gravitational parameter is a known body's in km^3/s^2."""
+    """Raise an error where a gravitational parameter equals that of a known body in km^3/s^2."""
     meant = body_of(1e9 * gravity)
     if meant is not None:
         raise at_key(key, f'm^3/s^2; that of the {meant} is "{gravity:.10g} km^3/s^2"', gravity)
@@ -84,7 +83,7 @@ def _file(what: str, gives: str = "SGP4 gives the state at the epoch, by default
 
 
 def _read_elements(given: Any) -> Any:
-    """Elements are read with the file; a table without one has no folder."""
+    """Return the elements that `with_orbit` has read. A file name that is left is refused: its table has no folder."""
     if given is not None and not isinstance(given, ElementSet | Ephemeris):
         raise refuse("a key of [orbit] of a scenario, which has a folder")
     return given
@@ -97,45 +96,49 @@ class Orbit(Table):
     position: Annotated[Any, *quantity(Gain("m", shape=(3,), spread=False, text="inertial position"))] = None
     velocity: Annotated[Any, *quantity(Gain("m/s", shape=(3,), spread=False, text="inertial velocity"))] = None
     altitude: Annotated[
-        float | None, *quantity(Gain("m", above=0.0, text="of a circular orbit, above the body's equatorial radius"))
+        float | None, *quantity(Gain("m", above=0.0, text="altitude of a circular orbit above the equatorial radius"))
     ] = None
-    semi_major_axis: Annotated[float | None, *quantity(Gain("m", text="of the orbit, negative for a hyperbola"))] = None
-    eccentricity: Annotated[float | None, *quantity(Gain("1", at_least=0.0, text="of the orbit, 0 if absent"))] = None
+    semi_major_axis: Annotated[float | None, *quantity(Gain("m", text="semi-major axis, negative for a hyperbola"))] = None
+    eccentricity: Annotated[float | None, *quantity(Gain("1", at_least=0.0, text="eccentricity, 0 if absent"))] = None
     inclination: Annotated[float | None, *quantity(ANGLE_UP)] = None
     raan: Annotated[float | None, *quantity(Gain("rad", text="right ascension of the ascending node, 0 if absent"))] = None
-    argument_of_perigee: Annotated[float | None, *quantity(Gain("rad", text="from the ascending node, 0 if absent"))] = None
-    true_anomaly: Annotated[
-        float | None, *quantity(Gain("rad", text="from the perigee, of a circle from the ascending node; 0 if absent"))
+    argument_of_perigee: Annotated[
+        float | None, *quantity(Gain("rad", text="angle from the ascending node, 0 if absent"))
     ] = None
-    gravitational_parameter: Annotated[float, *quantity(Gain("m^3/s^2", above=0.0, text="of the central body"))] = EARTH
+    true_anomaly: Annotated[
+        float | None, *quantity(Gain("rad", text="angle from the perigee, on a circle from the ascending node; 0 if absent"))
+    ] = None
+    gravitational_parameter: Annotated[float, *quantity(Gain("m^3/s^2", above=0.0, text="GM of the central body"))] = EARTH
     radius: Annotated[
         float | None,
-        *quantity(Gain("m", above=0.0, text="of the central body; known for the Sun, the planets and the Moon")),
+        *quantity(
+            Gain("m", above=0.0, text="equatorial radius of the central body; known for the Sun, the planets and the Moon")
+        ),
     ] = None
 
     epoch: Annotated[Any, *EPOCH_KEY] = None
     ephemeris: Annotated[
         int | None,
-        *quantity(replace(EPHEMERIS, text="how Sun and Moon move, for all parts that use them; almanac if absent")),
+        *quantity(
+            replace(EPHEMERIS, text="model of the motion of Sun and Moon, for all parts that use them; almanac if absent")
+        ),
     ] = None
     tle: Annotated[Any, *_file("two lines (TLE)")] = None
     omm: Annotated[Any, *_file("an orbit mean-elements message (OMM)")] = None
     oem: Annotated[
         Any,
-        *_file(
-            "an orbit ephemeris message (OEM)", "it has the state at the epoch, by default its first; the orbit flies on"
-        ),
+        *_file("an orbit ephemeris message (OEM)", "it gives the state at the epoch, by default its first"),
     ] = None
 
     @property
     def surface(self) -> float | None:
-        """The radius (m) of the central body, None where it is not known."""
+        """The radius (m) of the central body, or None if unknown."""
         known = body_of(self.gravitational_parameter)
         return self.radius if self.radius is not None or known is None else BODIES[known].radius
 
     @property
     def start(self) -> tuple[Vector, Vector]:
-        """Position (m) and velocity (m/s) at the start, inertial."""
+        """The inertial position (m) and velocity (m/s) at the start."""
         if self.position is not None:
             return self.position, self.velocity
         angles = [getattr(self, key) or 0.0 for key in ANGLES]
@@ -194,7 +197,7 @@ class Orbit(Table):
         return self
 
     def check_start(self, position: Vector, velocity: Vector) -> None:
-        """Raise an error where the orbit begins inside the central body, or leads through its centre."""
+        """Raise an error where the orbit starts inside the central body or passes through its centre."""
         gravity = self.gravitational_parameter
         key, value = ("semi_major_axis", self.semi_major_axis) if self.position is None else ("position", list(position))
         distance, fast = norm(position), norm(velocity)
@@ -211,8 +214,8 @@ class Orbit(Table):
             raise at_key("velocity", "an orbit that does not pass through the centre of attraction", list(velocity))
 
     def check_flight(self, duration: float, start: tuple[Vector, Vector] | None = None) -> None:
-        """An error where the spacecraft comes down to the body's surface during a run; a warning where it would later.
-        start: where that is known already."""
+        """Raise an error where the orbit meets the body's surface during a run of this duration (s); warn where it would
+        later. start: position and velocity, if already computed."""
         position, velocity = self.start if start is None else start
         gravity, surface = self.gravitational_parameter, self.surface
         escape = math.sqrt(2.0 * gravity / norm(position))

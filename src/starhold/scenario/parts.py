@@ -1,4 +1,4 @@
-"""Reads the [[part]] tables of a scenario: parts of any role, each in a file of its own, here or in another package."""
+"""Reads the [[part]] tables of a scenario, for parts of any role, installed or from a file."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,9 +30,9 @@ from starhold.scenario.starting import check_starts
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
 ROLES = tuple(role for role in PACKAGES if role != "body")
-"""Roles of parts in [[part]] tables; laws and bodies have tables of their own."""
+"""The roles of parts in [[part]] tables; laws and bodies have their own tables."""
 SINGLE = {"estimator": "one estimator for the law; others with watches = true", "target": "one target"}
-"""Roles that only one part of a loop may have."""
+"""The roles that only one part of a loop may have, with the text of the error."""
 
 
 class PartTable(Table):
@@ -45,9 +45,11 @@ class PartTable(Table):
 class EstimatorTable(PartTable):
     """The keys of an estimator's table besides its own parameters."""
 
-    watches: Annotated[bool, Field(description="whether it is only recorded and compared; the law uses another one")] = False
+    watches: Annotated[bool, Field(description="whether it is only recorded and compared, while the law uses another")] = (
+        False
+    )
     started_by: Annotated[
-        Name | None, Field(description="name of the estimator whose first valid attitude it starts with; none if absent")
+        Name | None, Field(description="estimator whose first valid attitude initializes it; none if absent")
     ] = None
 
 
@@ -58,7 +60,7 @@ def installed() -> dict[str, Part]:
 
 @cache
 def part_model(part: Part, shared: tuple[str, ...]) -> type[Any]:
-    """Return the table of a part; shared: keys of the scenario that give parameters in its place."""
+    """Return the model of a part's table; shared: scenario keys that set some of its parameters instead."""
     entries: dict[str, Any] = {"type": (Literal[part.name], part.name), **columns(own_fields(part.fields(), shared))}
     title = part.name.replace("-", " ").title().replace(" ", "")
     base = EstimatorTable if part.role == "estimator" else PartTable
@@ -68,9 +70,9 @@ def part_model(part: Part, shared: tuple[str, ...]) -> type[Any]:
 def read_parts(
     tables: Any, body: str, folder: Path, where: str, shared: Mapping[str, Any], units: Any = None
 ) -> tuple[Fitted, ...]:
-    """Return the parts of a file's [[part]] tables, for a body; file names in them are relative to a folder; shared: the
-    values that the file gives to all parts; units: of a body whose numbers are scaled. InputError for the first invalid
-    table; `check_fit` checks all parts together."""
+    """Return the parts of a file's [[part]] tables for a body. folder: base of relative file names; shared: values that
+    apply to all parts; units: those of a body with scaled numbers. InputError for the first invalid table. `check_fit`
+    later checks all parts together."""
     if tables is None:
         return ()
     if not isinstance(tables, list):
@@ -89,7 +91,7 @@ def read_parts(
 def read_part(
     table: dict[str, Any], body: str, folder: Path, where: str, key: str, shared: Mapping[str, Any], units: Any = None
 ) -> Fitted:
-    """Return the part of a raw table, named `key` in errors, with the name from the table, if any."""
+    """Return the part that a raw table, named `key` in errors, describes."""
     part = in_file(table, _read, "part", folder, where, key) if "file" in table else _of_type(table, where, key)
     if part.body not in ("", body):
         raise InputError(where, key, f"{part.name}, for the body {part.body}", f"a part for {body}")
@@ -102,7 +104,7 @@ def read_part(
 
 
 def params_of(part: Part, read: Any, shared: Mapping[str, Any]) -> Any:
-    """Return the parameters of a part from its validated table, and from the values that the scenario gives to all parts."""
+    """Return the parameters of a part from its validated table and from the values shared by all parts."""
     values = values_of(part.fields(), read, shared)
     return part.params(**{name: value for name, value in values.items() if value is not None})
 
@@ -126,7 +128,7 @@ def _read(path: Path) -> Part:
 
 
 def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: str) -> dict[str, Any]:
-    """Return the table with the rows of CSV files in place of their names."""
+    """Return the table with the names of CSV files replaced by the rows in them."""
     filled = dict(table)
     for item in part.fields():
         given = table.get(item.name)
@@ -147,7 +149,7 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
 
 
 def check_fit(loop: ClosedLoop, where: str) -> None:
-    """Raise InputError where the parts of a loop do not fit together."""
+    """Raise InputError where the parts of a loop are incompatible."""
     loop = _with_watched(loop, where)
     fitted = loop.parts
     for role, most in SINGLE.items():
@@ -185,7 +187,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
 
 
 def _check_estimates(loop: ClosedLoop, where: str) -> None:
-    """InputError where a law needs what no estimator gives, or another body than the one that is orbited."""
+    """Raise InputError where a law needs a quantity that no estimator gives, or an orbit about another body."""
     there = [name for fitted in loop.used("estimator") for name in fitted.part.module.Estimate._fields]
     says = [IS_VALID] if loop.used("estimator") and IS_VALID in loop.law.reads else []
     for name in (*getattr(loop.law.module, "ESTIMATES", ()), *says):
@@ -200,7 +202,7 @@ def _check_estimates(loop: ClosedLoop, where: str) -> None:
 
 
 def _measuring(reading: str) -> str:
-    """Describe a sensor of a reading, with installed examples."""
+    """Return the text for a sensor that gives a reading, with installed examples."""
     if reading == FIX:
         return "started_by, the estimator whose first valid attitude it begins with"
     known = [name for name, part in parts("sensor").items() if reading in part.module.Reading._fields and not part.table]
@@ -208,12 +210,12 @@ def _measuring(reading: str) -> str:
 
 
 def _acting(loop: ClosedLoop) -> list[Fitted]:
-    """Return the effectors that take the command, in any mode."""
+    """Return the effectors that take the command in any mode."""
     return [f for f in loop.used("effector") if f.part.flag("ACTS")]
 
 
 def _check_effectors(loop: ClosedLoop, where: str) -> None:
-    """Raise InputError unless exactly one effector takes the command, in each mode of a law made of modes."""
+    """Raise InputError where two effectors would take the command at once, or a mode has none for it."""
     acting, known = _acting(loop), [f.part.name for f in loop.used("effector") if can_be_inactive(f.part)]
     module: Any = loop.law.module
     if not isinstance(module, Modes):
@@ -238,10 +240,10 @@ def _check_effectors(loop: ClosedLoop, where: str) -> None:
 
 
 def _check_outside(law: Law, acting: list[Fitted], where: str, key: str) -> None:
-    """Raise InputError where a law's torque must be external, and an effector would only exchange momentum."""
+    """Raise InputError where a law needs an external torque but the effectors can only exchange momentum."""
     if law.flag("FROM_OUTSIDE") and acting and not acting[0].part.flag("OUTSIDE"):
-        given = f"{law.name} with {acting[0].called}, which keep the momentum that it is to remove"
-        raise InputError(where, key, given, "magnetorquers, another effector that acts from outside, or none")
+        given = f"{law.name} with {acting[0].called}, which store the momentum that it should remove"
+        raise InputError(where, key, given, "magnetorquers, another effector with an external torque, or none")
 
 
 def _key(fitted: Fitted) -> str:
@@ -249,8 +251,8 @@ def _key(fitted: Fitted) -> str:
 
 
 def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
-    """Raise InputError where a part cannot work with its numbers, or a part's file fails: a control step is flown in plain
-    Python, which runs every line. `key`: the law's name in errors."""
+    """Fly a control step in plain Python, which runs every line. InputError where a part cannot work with its parameters or
+    the file of a part fails; `key`: the law's name in errors."""
     crafts = (loop.craft, *(event.craft for event in loop.events))
     for fitted in loop.parts:
         own_file = fitted.part.file is not None
@@ -292,14 +294,13 @@ def _with_watched(loop: ClosedLoop, where: str) -> ClosedLoop:
 
 
 def _watched(fitted: Fitted, loop: ClosedLoop, where: str) -> Fitted:
-    """Return a part from a file with every equation checked when it is called."""
+    """Return a part from a file, with its equations wrapped so that their results are checked at every call."""
     module: Any = _Watched(fitted, loop.start, where)
     return replace(fitted, part=replace(fitted.part, module=module))
 
 
 class _Watched:
-    """Return the module of a part from a file, whose equations raise InputError where they fail or break their role's
-    contract."""
+    """The module of a part from a file; its equations raise InputError where they fail or violate their role's contract."""
 
     def __init__(self, fitted: Fitted, state: Any, where: str) -> None:
         self._fitted, self._state, self._where = fitted, state, where
@@ -325,7 +326,7 @@ class _Watched:
         return called
 
     def _wrong(self, part: Part, name: str, result: Any, given: Any) -> str:
-        """Describe the result that the equation should return, where it does not."""
+        """Return a description of the result that an equation should have returned; "" where the result is right."""
         if name in VECTORS.get(part.role, ()):
             return "" if _alike(result, ZERO) or (result is None and name in MOVING) else "three numbers"
         if (part.role, name) == ("effector", "inertia"):
@@ -355,13 +356,13 @@ VECTORS = {
     "effector": ("reaction", "push", "momentum", "applied"),
     "actuator": ("command", "rates"),
 }
-"""Equations that return three numbers."""
+"""The equations of each role that return three numbers."""
 MOVING = ("acceleration", "push")
-"""Those of them that return None where the numbers of the part move nothing."""
+"""Those of them that may return None, where the part exerts no force."""
 
 
 def _undeclared(kind: Any) -> str:
-    """Describe what recordings need and a kind of tuple lacks."""
+    """Return what a type must have to be recorded; "" where it does."""
     try:
         quantities(kind)
     except Exception:
@@ -370,7 +371,7 @@ def _undeclared(kind: Any) -> str:
 
 
 def _alike(one: Any, other: Any, still: bool = False) -> bool:
-    """Return whether two states have the same form; still: None in the first means unchanged."""
+    """Return whether two values have the same structure; still: whether None in the first one is allowed too."""
     if still and one is None:
         return True
     if isinstance(one, tuple):

@@ -1,4 +1,4 @@
-"""Refuses conditions of modes that can never hold, whatever is flown."""
+"""Refuses conditions of modes that cannot hold in any flight."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from starhold.parts.part import Fitted
 from starhold.parts.pushes import moves
 
 FULL = 1.01
-"""The share of a bound of momentum or distance from which a level or an orbit counts as beyond it."""
+"""The factor by which a level or an orbit must exceed a bound on momentum or distance to count as unreachable."""
 APART, UPRIGHT = math.radians(1.0), math.radians(0.3)
-"""How much nearer the path over ground may come to a station than the orbit's inclination says, and a bound of the angle
+"""Allowance by which the ground track may come closer to a station than the inclination implies, and a bound on the angle
 between the station's vertical and the direction from the Earth's centre."""
 ENOUGH = 12
-"""With more wheels than these, the bound is the sum of what each one stores."""
+"""The largest number of wheels for which the bound is exact; for more it is the sum of their largest momenta."""
 
 
 class Most(NamedTuple):
-    """The quantity of a test never reaches `level`; `allowed` says so."""
+    """A level (SI) that the quantity of a test never reaches; unit and text of the error."""
 
     test: str
     level: float
@@ -38,7 +38,7 @@ class Most(NamedTuple):
 
 def check_possible(loop: ClosedLoop, where: str, law: str) -> None:
     """Raise InputError for the first condition of a law's modes that can never hold, and where more wheels have to be lost
-    than there are; law: how errors call it."""
+    than exist; law: its name in errors."""
     module: Any = loop.law.module
     if not isinstance(module, Modes):
         return
@@ -61,14 +61,14 @@ def check_possible(loop: ClosedLoop, where: str, law: str) -> None:
 
 
 def _bounds(loop: ClosedLoop, numbers: Mapping[str, float]) -> Iterable[Most]:
-    """The bounds of the quantities of a condition's tests, whose numbers these are."""
+    """Yield the bounds on the quantities that a condition tests; numbers: the levels of its tests."""
     if "wheel_momentum_above" in numbers:
         stored = max(_stored(parts) for parts in (loop.parts, *(event.parts for event in loop.events)))
         allowed = f"less than {stored:.4g} N m s, the most that the wheels store" if stored else "a loop with wheels"
         yield Most("wheel_momentum_above", FULL * stored, "N m s", allowed)
     for test in ("angle_above", "sun_angle_above"):
         if test in numbers:
-            yield Most(test, math.pi, "deg", "less than 180 deg, for no angle is larger")
+            yield Most(test, math.pi, "deg", "less than 180 deg, because no angle is larger")
     if "elevation_above" in numbers:
         inclination, most = _highest_seen(loop, numbers)
         allowed = f"less than {math.degrees(most):.4g} deg"
@@ -83,8 +83,8 @@ def _wheels(parts: Iterable[Fitted]) -> list[Fitted]:
 
 
 def _stored(parts: Iterable[Fitted]) -> float:
-    """The largest momentum (N m s) that the parts of a loop which take the command can store, in norm, as laws are given it:
-    wheels, of which each is full one way or the other; infinity where others may store any."""
+    """Return the largest norm of the momentum (N m s) that the effectors for the command can store, as laws know it, with
+    every wheel at its limit in either direction; infinity where another effector may store an unknown momentum."""
     acting = [fitted for fitted in parts if fitted.part.role == "effector" and fitted.part.flag("ACTS")]
     wheels = _wheels(acting)
     if any(not fitted.part.flag("OUTSIDE") or fitted.part.file is not None for fitted in acting if fitted not in wheels):
@@ -100,8 +100,8 @@ def _full(axes: Any, limits: Any) -> float:
 
 
 def _highest_seen(loop: ClosedLoop, numbers: Mapping[str, float]) -> tuple[float, float]:
-    """The inclination of the orbit (rad), and a bound of the elevation (rad) at which a station ever sees the craft; 90 deg
-    where a force may change the orbit."""
+    """Return the inclination of the orbit (rad) and a bound on the elevation (rad) of the craft above a station's horizon;
+    90 deg where a force may change the orbit."""
     position, velocity = loop.start.position, loop.start.velocity
     normal, far = cross(position, velocity), highest(position, velocity, loop.craft.gravity)
     inclination = math.acos(max(-1.0, min(1.0, normal[2] / norm(normal))))

@@ -14,7 +14,7 @@ from starhold.scenario.tables import refuse
 from starhold.scenario.units import shown, to_either, to_number
 
 LEAST, MOST = 1e-30, 1e30
-"""The least and the greatest size of nonzero quantities in files; for a vector or matrix the size of its largest entry."""
+"""The smallest and the largest magnitude of nonzero quantities in files; of a vector or matrix, of its largest entry."""
 PLAIN = {
     "rad": (math.tau, "deg"),
     "rad/s": (math.tau, "deg/s"),
@@ -27,27 +27,27 @@ PLAIN = {
     "kg m": (1e-2, "g mm"),
     "W": (1e4, "mW"),
 }
-"""By unit: the largest plain number that is accepted, and the unit that was probably meant with a larger one."""
+"""For each unit the largest plain number accepted, and the unit probably meant by a larger number."""
 MOST_WHOLE = 2**53
-"""Up to this size floats represent every whole number."""
+"""Floats represent every whole number up to this size exactly."""
 
 
 Annotations: TypeAlias = tuple[BeforeValidator, WithJsonSchema, Gain]
-"""The validator of a quantity, its JSON schema, and its declaration, which pydantic leaves with the field."""
+"""The validator of a quantity, its JSON schema, and its declaration, which pydantic keeps with the field."""
 
 
 def quantity(gain: Gain) -> Annotations:
-    """The annotations by which pydantic reads a quantity: `Annotated[Any, *quantity(Gain("N m", above=0.0))]`."""
+    """Return the annotations by which pydantic reads a quantity: `Annotated[Any, *quantity(Gain("N m", above=0.0))]`."""
     return BeforeValidator(reader(gain)), WithJsonSchema(_schema(gain)), gain
 
 
 def declared(field: FieldInfo) -> Gain | None:
-    """The declaration of a table's key that is a quantity, None for any other."""
+    """Return the declaration of a table's key that is a quantity; None for other keys."""
     return next((item for item in field.metadata if isinstance(item, Gain)), None)
 
 
 def quantity_or(word: str, meaning: float, gain: Gain) -> Annotations:
-    """The annotations for a quantity or a word in its place."""
+    """Return the annotations for a quantity, or for a word that stands for a value of it."""
     read, schema = reader(gain), _schema(gain)
     described = {"anyOf": [{"const": word}, *schema["anyOf"]], "description": schema["description"]}
     return BeforeValidator(lambda value: meaning if value == word else read(value)), WithJsonSchema(described), gain
@@ -59,13 +59,13 @@ _ROW = {"type": "array", "items": {"anyOf": _SINGLE}}
 
 
 def raw(text: str) -> tuple[BeforeValidator, WithJsonSchema]:
-    """The annotations for numbers with the unit of another key: `Annotated[Any, *raw("the least value")]`."""
+    """Return the annotations for numbers in the unit of another key: `Annotated[Any, *raw("the least value")]`."""
     schema = {"anyOf": [*_SINGLE, _ROW, {"type": "array", "items": _ROW}], "description": text}
     return BeforeValidator(_raw), WithJsonSchema(schema)
 
 
 def _raw(value: Any) -> Any:
-    """Return the value, if it may represent a number or numbers of another key."""
+    """Return the value unchanged. An error unless it is a number, a text, or a list of them."""
     if isinstance(value, list | tuple):
         return [_raw(item) for item in cast(list[Any], value)]
     if isinstance(value, bool) or not isinstance(value, int | float | str):
@@ -80,13 +80,13 @@ SCALED = {"length": "m", "velocity": "m/s", "acceleration": "m/s^2", "time": "s"
 
 
 def any_quantity(gain: Gain) -> Annotations:
-    """The annotations for a quantity, scaled where the declaration has a dimension."""
+    """Return the annotations for a quantity, scaled where the declaration has a dimension."""
     return scaled(gain.dimension, replace(gain, unit=SCALED[gain.dimension])) if gain.dimension else quantity(gain)
 
 
 def scaled(kind: Literal["length", "velocity", "acceleration", "time", "rate"], gain: Gain) -> Annotations:
-    """The annotations for scaled numbers: plain ones are scaled already, strings with the gain's unit are converted. The SI
-    value of one unit is in the validation's context, under the name of its kind; the bounds apply to scaled numbers."""
+    """Return the annotations for scaled numbers. Plain numbers are scaled already; strings with a unit are converted by the
+    SI value of the scaled unit, which the validation's context holds under its kind. Bounds apply to scaled numbers."""
     read, schema = reader(gain), _schema(gain)
     schema["description"] = f"{gain.text} (scaled, or with a unit such as {gain.unit})"
 
@@ -97,8 +97,8 @@ def scaled(kind: Literal["length", "velocity", "acceleration", "time", "rate"], 
 
 
 def reader(gain: Gain) -> Callable[..., Any]:
-    """Return a function that converts a value of a file to numbers of the declared shape and bounds; its second argument is
-    the SI value of the unit of the result, 1 for SI."""
+    """Return a function that converts a value in a file to numbers of the declared shape within the declared bounds; its
+    second argument is the SI value of the result's unit, 1 for SI."""
 
     def read(value: Any, worth: float = 1.0) -> Any:
         try:
@@ -118,11 +118,11 @@ def _plain(error: Exception) -> str:
 
 
 def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
-    # Tuples are defaults.
+    # Values are tuples where they are defaults.
     if isinstance(value, (list, tuple)):
         items, units = cast(list[Any], value), gain.unit.split(", ")
         if 1 < len(units) == len(gain.columns) and not any(isinstance(item, (list, tuple)) for item in items):
-            # A row of a table whose columns have units of their own.
+            # A row of a table whose columns have different units.
             if len(items) not in (0, len(units)):
                 raise ValueError(gain.describe())
             return [_to_numbers(item, replace(gain, unit=unit), worth) for item, unit in zip(items, units, strict=False)]
@@ -141,12 +141,12 @@ def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
 
 
 def plain(gain: Gain) -> tuple[float, str]:
-    """Return the largest plain number that is accepted, and the unit that was probably meant with a larger one."""
+    """Return the largest plain number accepted, and the unit probably meant by a larger number."""
     return gain.plain or PLAIN.get(gain.unit, (math.inf, ""))
 
 
 def ask_for_unit(value: float, unit: str, within: str, other: str) -> str:
-    """Return the text that asks for the unit of an implausible plain number; other: the unit probably meant."""
+    """Return the text of an error that asks for the unit of an implausible plain number; other: the unit probably meant."""
     meant = f'with a unit it is "{value:g} {other}"'
     if unit == "1":
         return f"a plain number is a share, {within}; {meant}"
@@ -154,7 +154,7 @@ def ask_for_unit(value: float, unit: str, within: str, other: str) -> str:
 
 
 def _check_size(value: Any) -> None:
-    """Raise ValueError for numbers whose powers overflow or underflow, which no flying craft has."""
+    """Raise ValueError for numbers whose powers would overflow or underflow; no real craft has such."""
     size = float(np.max(np.abs(np.asarray(value, dtype=float))))
     if math.isfinite(size) and size and not LEAST <= size <= MOST:
         raise ValueError(f"0, or between {LEAST:g} and {MOST:g} in size")

@@ -1,4 +1,4 @@
-"""Reads a scenario file; every error in it is reported in one line."""
+"""Reads a scenario file and reports every error in one line."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from starhold.scenario.schema import APART
 from starhold.scenario.writing import toml_text
 
 LONGEST_PATH = 200
-"""The most characters of a path that errors show."""
+"""The most characters of a path in errors."""
 WHERE = "scenario"
-"""The name in errors of a scenario that is not from a file."""
+"""The name, in errors, of a scenario that is not from a file."""
 
 
 @dataclass(frozen=True, repr=False)
 class LawEntry:
-    """A law with its gains and its name in the file."""
+    """A law of a scenario, with its gains and its name in the file."""
 
     name: str
     law: Law
@@ -45,9 +45,9 @@ class LawEntry:
     spec: Any = None
     """The design form of the gains, and its inputs; None where the file gives the gains themselves."""
     targets: tuple[Fitted, ...] = ()
-    """The targets of a law's modes where these have their own, one each."""
+    """The target of each mode, for a law whose modes have their own targets."""
     slews: tuple[Slew | None, ...] = ()
-    """How each of them is reached as its mode begins."""
+    """The slew by which each target is reached when its mode begins."""
 
     def __repr__(self) -> str:
         return f"<law {self.name}: {self.law.name}, {self.gains}>"
@@ -65,11 +65,11 @@ class Scenario:
     where: str = ""
     folder: Path = Path()
     allow_unstable: bool = False
-    """Whether gains are accepted that a law's own check finds unstable."""
+    """Whether gains are accepted although the law's own check finds them unstable."""
     parts: tuple[Fitted, ...] = ()
-    """The parts that [[part]] tables give."""
+    """The parts of the [[part]] tables."""
     supposed: Scenario | None = None
-    """The tables that laws assume and are designed for, without laws, where [nominal] gives others."""
+    """The nominal scenario that laws assume and are designed for, without laws; None without a [nominal] table."""
 
     @property
     def name(self) -> str:
@@ -78,27 +78,27 @@ class Scenario:
 
     @property
     def body(self) -> str:
-        """The name of the body, the part that moves."""
+        """The name of the controlled body."""
         return self.hooks.name
 
     @cached_property
     def made(self) -> Made:
-        """The numbers that the tables define. InputError where no body has them."""
+        """The numbers that the tables define. InputError where they are physically impossible."""
         return self.hooks.make(self.table, self.where)
 
     @property
     def craft(self) -> Any:
-        """The numbers of the body that flies."""
+        """The true craft, the numbers of the body that flies."""
         return self.made.craft
 
     @property
     def known(self) -> Scenario:
-        """The scenario that laws assume and are designed for."""
+        """The scenario that laws assume and are designed for: the nominal one, or this one."""
         return self.supposed or self
 
     @property
     def nominal_craft(self) -> Any:
-        """The body's numbers in the nominal model; None where those are the ones that fly."""
+        """The craft of the nominal model; None without a [nominal] table."""
         return None if self.supposed is None else self.supposed.craft
 
     def __repr__(self) -> str:
@@ -107,9 +107,9 @@ class Scenario:
 
     @shortly
     def with_(self, changes: Mapping[str, Any]) -> Scenario:
-        """Return the scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m
-        s"}; a law's or a part's table is found by its name, or by its index as "law[1]"; None removes a key. InputError as
-        for a file."""
+        """Return the scenario with other values of some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m
+        s"}. The table of a law or part is found by its name, or by its number as "law[1]"; None removes a key. InputError
+        as for a file."""
         other = changed(self, changes)
         flown, before = ((getattr(s.table, "orbit", None), s.parts, s.table.simulation.duration) for s in (other, self))
         if flown != before:
@@ -117,19 +117,19 @@ class Scenario:
         return other
 
     def _of(self, tables: Mapping[str, Any]) -> Scenario:
-        """Return the scenario of other raw tables, read like this one."""
+        """Return the scenario of other raw tables, read with this one's settings."""
         return read_tables(tables, toml_text(tables), self.where, self.folder, self.allow_unstable)
 
     @shortly
     def pick(self, name: str | None) -> LawEntry:
-        """Return the law of this name, by default the first; InputError names the nearest where there is none."""
+        """Return the law of this name, by default the first. InputError, which suggests the nearest name, if none has it."""
         names = [entry.name for entry in self.laws]
         if name is not None and name not in names:
             raise InputError(self.where, "law", name, nearest(name, names))
         return self.laws[0 if name is None else names.index(name)]
 
     def about(self, body: str) -> Scenario:
-        """Return the scenario itself; InputError unless it is about the body of this name."""
+        """Return the scenario itself. InputError unless its body has this name."""
         if self.body != body:
             raise InputError(self.where, self.hooks.marker, f"a scenario of a {self.body}", f"here one of a {body}")
         return self
@@ -147,13 +147,13 @@ def builtin_text(name: str) -> str:
 
 
 def open_scenario(source: Scenario | str | Path) -> Scenario:
-    """Return the scenario itself, or the one that `load` reads from a file or a built-in name."""
+    """Return a scenario as it is, or the one that `load` reads from a file or a built-in name."""
     return source if isinstance(source, Scenario) else load(source)
 
 
 def load(source: str | Path, allow_unstable: bool = False) -> Scenario:
-    """Read the scenario in a file, or the built-in one of that name. InputError states its first error; gains that a law's
-    own check finds unstable are errors unless allowed."""
+    """Return the scenario in a file, or the built-in one of that name. InputError states the first error in it; gains that
+    the law's own check finds unstable are errors unless allowed."""
     return parse(*_read_text(source), allow_unstable)
 
 
@@ -166,7 +166,7 @@ def _read_text(source: str | Path) -> tuple[str, str, Path]:
         if not path.is_file() and str(source) in builtin_names():
             return builtin_text(str(source)), str(source), Path()
         with path.open(encoding="utf-8") as file:
-            # No more than the limit, because a device may be endless.
+            # No more than the limit, because a device file may be endless.
             return file.read(LONGEST_TEXT + 1), where, path.parent
     except FileNotFoundError:
         known = nearest(where, builtin_names())
@@ -177,7 +177,7 @@ def _read_text(source: str | Path) -> tuple[str, str, Path]:
 
 
 def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:
-    """Read the scenario of a TOML text; `where` names it in errors."""
+    """Return the scenario of a TOML text; `where` names it in errors."""
     scenario = read_tables(read_toml(text, where), text, where, folder, allow_unstable)
     say_distance(scenario)
     return scenario
@@ -185,10 +185,10 @@ def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = F
 
 @shortly
 def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> Scenario:
-    """Make a scenario from tables as in a file, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law": [{"type":
-    "pd", ...}]}: strings, numbers, booleans, dates, lists and tables; tuples and NumPy arrays count as lists, a SciPy
-    Rotation as the quaternion of an attitude, and None as absent. File names in it are relative to `folder`. InputError as
-    for a file. The scenario's `with_` makes variants, and its `text` is the file."""
+    """Return the scenario of tables as in a file, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
+    [{"type": "pd", ...}]}. Values are strings, numbers, booleans, dates, lists and tables; tuples and NumPy arrays count as
+    lists, a SciPy Rotation as the quaternion of an attitude, and None as absent. File names are relative to `folder`.
+    InputError as for a file. The scenario's `with_` makes variants, and its `text` is the text of the file."""
     expect(tables, Mapping, WHERE, 'tables, {"spacecraft": {...}, ...}; sh.load reads a file or a name')
     written = plain(tables, WHERE, "")
     scenario = read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
@@ -197,10 +197,10 @@ def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_uns
 
 
 def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:
-    """Return the scenario of a text's raw tables."""
+    """Return the scenario of the raw tables of a text."""
     body = body_of(data, where, folder)
     data = with_orbit(with_files(data, folder, where), folder, where)
-    # First of all, for it scales the numbers of the other tables.
+    # First, because it gives the units of scaled numbers in the other tables.
     context = body.context(data, where)
     table = _tables(body, data, where, context)
     parts = read_parts(data.get("part"), body.name, folder, where, table.shared, context)
@@ -221,7 +221,7 @@ def _tables(body: Body, data: Mapping[str, Any], where: str, context: Any) -> An
 
 
 def _supposed(scenario: Scenario, data: Mapping[str, Any], context: Any) -> Scenario:
-    """Return the scenario with the tables of [nominal] in place of its own, which laws assume."""
+    """Return the nominal scenario, which laws assume: the tables of [nominal] replace the scenario's own."""
     given, known = scenario.table.nominal, [*scenario.hooks.modelled, *scenario.hooks.designed]
     for name in given:
         if name not in known:
@@ -237,7 +237,7 @@ def _supposed(scenario: Scenario, data: Mapping[str, Any], context: Any) -> Scen
 
 
 def _read_law(data: Any, scenario: Scenario, context: Any, key: str, taken: set[str]) -> LawEntry:
-    """Return the law of a raw table, for a scenario that has no laws yet."""
+    """Return the law of a raw table, for a scenario without laws as yet; `taken`: names of other laws."""
     body, where = scenario.hooks, scenario.where
     reads = read_modes if has_modes(data, body) else read_gains
     law, form, table, spec, gains, targets, slews = reads(data, scenario, context, key)

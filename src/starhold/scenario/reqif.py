@@ -16,7 +16,7 @@ from starhold.scenario.requirement import key_of
 
 _TAGS = re.compile(r"<[^>]*>")
 _HOUSE = uuid.UUID("6f0c2b0e-95a7-4a2f-9a44-0f4f3b5b7a11")
-"""The name space of new identifiers, so that equal requirements get equal ones."""
+"""The name space of new identifiers; equal requirements get equal identifiers."""
 ENUMERATION, XHTML = "ENUMERATION", "XHTML"
 
 
@@ -28,7 +28,7 @@ def _module(name: str, where: str) -> Any:
 
 
 def _parsed(data: bytes, where: str) -> Any:
-    """Return the bundle of a file. InputError where it is not ReqIF."""
+    """Return the ReqIF bundle (of package `reqif`) in a file. InputError where the file is not ReqIF."""
     parser = _module("parser", where)
     try:
         bundle = parser.ReqIFParser.parse_from_string(data.decode("utf-8-sig"))
@@ -42,13 +42,13 @@ def _parsed(data: bytes, where: str) -> Any:
 
 
 def read(data: bytes, where: str) -> list[dict[str, str]]:
-    """Return the objects of a file in order, as rows of texts by the long names of their attributes. An object without an id
-    attribute has its identifier as "id", one without a parent attribute the object above it in the hierarchy as "parent"."""
+    """Return the objects of a file in order, each as texts by the long names of its attributes. Without an id attribute,
+    "id" is the object's identifier; without a parent attribute, "parent" is the object above it in the hierarchy."""
     return [row for _, row in _rows(_parsed(data, where).core_content.req_if_content)]
 
 
 def _rows(content: Any) -> list[tuple[Any, dict[str, str]]]:
-    """Return the objects with their rows; see `read`."""
+    """Return the objects, each with its row as `read` returns it."""
     names = {one.identifier: one.long_name or one.identifier for one in _definitions(content)}
     words = {
         value.identifier: value.long_name or value.identifier
@@ -74,7 +74,7 @@ def _definitions(content: Any) -> Iterator[Any]:
 
 
 def _text(attribute: Any, words: Mapping[str, str]) -> str:
-    """Return the value of an attribute as text: an enumeration by its words, formatted text without its markup."""
+    """Return the value of an attribute as text: the words of an enumeration, formatted text without its markup."""
     kind, value = attribute.attribute_type.name, attribute.value
     if kind == ENUMERATION:
         return ", ".join(words.get(one, one) for one in value)
@@ -94,8 +94,8 @@ def _places(content: Any) -> Iterator[tuple[str | None, Any]]:
 
 
 def written(rows: Sequence[Mapping[str, str]], title: str, original: bytes | None, where: str) -> str:
-    """Write rows as the text of a ReqIF file; with an original, only what differs in the rows is replaced and what is
-    missing is added. InputError where the original is not ReqIF, or formatted text or a choice would have to change."""
+    """Return rows as the text of a ReqIF file. With an original, only values that differ are replaced and missing objects
+    added. InputError where the original is not ReqIF, or where formatted text or a choice would have to change."""
     bundle = _parsed(_empty(title) if original is None else original, where)
     content = bundle.core_content.req_if_content
     there = {dict(keyed(row))["id"]: (one, row) for one, row in _rows(content)}
@@ -108,7 +108,7 @@ def written(rows: Sequence[Mapping[str, str]], title: str, original: bytes | Non
 
 
 def keyed(row: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """Return the row by keys of requirements, where columns are such keys."""
+    """Yield the keys and texts of a row, with columns renamed to keys of requirements where they match one."""
     return ((key_of(name) or name, text) for name, text in row.items())
 
 
@@ -117,12 +117,12 @@ def _now() -> str:
 
 
 def _name(*parts: str) -> str:
-    # XML identifiers begin with a letter or this.
+    # XML identifiers begin with a letter or an underscore.
     return f"_{uuid.uuid5(_HOUSE, ' '.join(parts))}"
 
 
 def _put(content: Any, one: Any, column: str, text: str, where: str) -> None:
-    """Set this text of an object in the column; its type gets an attribute for it if it has none."""
+    """Set the text of an object's attribute; its type gets the attribute if it lacks it."""
     kind = next(kind for kind in content.spec_types if kind.identifier == one.spec_object_type)
     named = (d for d in kind.attribute_definitions or () if column in (d.long_name, key_of(d.long_name or "")))
     definition = next(named, None) or _defined(content, kind, column, where)
@@ -141,7 +141,7 @@ def _put(content: Any, one: Any, column: str, text: str, where: str) -> None:
 
 
 def _defined(content: Any, kind: Any, column: str, where: str) -> Any:
-    """Make a new plain-text attribute of a type."""
+    """Add a plain-text attribute to a type and return it."""
     string = next((one for one in content.data_types if type(one).__name__.endswith("String")), None)
     if string is None:
         types = _module("models.reqif_data_type", where)
@@ -159,7 +159,7 @@ def _defined(content: Any, kind: Any, column: str, where: str) -> Any:
 
 
 def _added(content: Any, title: str, called: str, where: str) -> Any:
-    """Make a new object of the first object type, at the end of the first specification."""
+    """Add an object of the first object type to the end of the first specification and return it."""
     kind = next(one for one in content.spec_types if type(one).__name__ == "ReqIFSpecObjectType")
     make: Callable[..., Any] = _module("models.reqif_spec_object", where).ReqIFSpecObject
     one = make(_name(title, called), [], kind.identifier, last_change=_now())
@@ -173,7 +173,7 @@ def _added(content: Any, title: str, called: str, where: str) -> Any:
 
 
 def _empty(title: str) -> bytes:
-    """Make a file with one object type and one specification, without objects."""
+    """Return a bundle with one object type and one specification, without objects."""
     names = {what: _name(title, what) for what in ("header", "string", "kind", "document", "whole")}
     text = (resources.files("starhold.scenario") / "empty.reqif").read_text(encoding="utf-8")
     return text.format(title=escape(title), now=_now(), **names).encode()

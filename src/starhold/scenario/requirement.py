@@ -1,5 +1,5 @@
-"""The [[requirement]] tables of a scenario: what is required of a flight, and the method of verification. Limits are in the
-unit of their metric, so they stay as in the file; `studies.requirements` reads them.
+"""The [[requirement]] tables of a scenario: requirements on a flight and their methods of verification. Limits are in the
+unit of their metric, so they stay as in the file; `studies.requirements` converts them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from starhold.scenario.tables import LONGEST_NAME, Table, at_key, refuse, told_a
 
 CONE = "exclusion-cone"
 BEGINS = "mode_begins"
-"""The time at which the mode of a requirement first begins."""
+"""The metric "time at which a mode first begins"."""
 Method: TypeAlias = Literal["proof", "flight", "campaign", "budget", "margin", "inspection"]
 METHODS_OF: Mapping[str, tuple[Method, ...]] = MappingProxyType(
     {
@@ -31,7 +31,7 @@ METHODS_OF: Mapping[str, tuple[Method, ...]] = MappingProxyType(
         "record": ("inspection",),
     }
 )
-"""The methods that use a key; any other key applies to all methods."""
+"""The methods to which a key applies; keys not listed apply to all methods."""
 _IN_IDS = "-_. /:#()+{}"
 
 
@@ -46,11 +46,11 @@ Id: TypeAlias = Annotated[str, AfterValidator(_check_id)]
 
 
 class RequirementTable(Table):
-    """A requirement, with the method that verifies it; without a method, the requirements derived from it decide."""
+    """A requirement and the method that verifies it; without a method, the requirements derived from it decide."""
 
-    id: Annotated[Id | None, Field(description="its name in tables, columns and other tools; the metric if absent")] = None
+    id: Annotated[Id | None, Field(description="identifier in tables, columns and other tools; the metric if absent")] = None
     text: Annotated[str, Field(description="the requirement in words")] = ""
-    method: Annotated[Method | None, Field(description="how it is verified")] = None
+    method: Annotated[Method | None, Field(description="method of verification")] = None
     metric: Annotated[
         str | None, Field(description="the bounded quantity: a metric of summaries, lost, or exclusion-cone")
     ] = None
@@ -64,12 +64,14 @@ class RequirementTable(Table):
     )
     direction: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="inertial axis of that cone"))] = None
     share: Annotated[
-        float, *quantity(Gain("1", above=0.0, at_most=1.0, text="of the runs that must keep it, such as 99.73 %"))
+        float, *quantity(Gain("1", above=0.0, at_most=1.0, text="share of runs that must meet it, such as 99.73 %"))
     ] = 0.9973
     confidence: Annotated[
-        float, *quantity(Gain("1", above=0.0, at_most=1.0, text="of the verdict: one less the consumer's risk"))
+        float, *quantity(Gain("1", above=0.0, at_most=1.0, text="confidence of the verdict: 1 minus the consumer's risk"))
     ] = 0.9
-    record: Annotated[str | None, Field(description="a file of its inspection, relative to this one")] = None
+    record: Annotated[str | None, Field(description="the record of its inspection, a file name relative to this file")] = (
+        None
+    )
     parent: Annotated[Id | None, Field(description="the id of the requirement that it is derived from")] = None
     rationale: Annotated[str, Field(description="why it is required")] = ""
     file: Annotated[str | None, Field(description="a CSV or ReqIF file of requirements, relative to this one")] = None
@@ -100,7 +102,7 @@ class RequirementTable(Table):
             raise at_key("at_least", "either at_most or at_least; a range is two requirements", self.at_least)
         for key in ("share", "confidence"):
             if getattr(self, key) == 1.0:
-                raise at_key(key, "below 1, for no number of runs shows that there is no exception", 1.0)
+                raise at_key(key, "below 1, because no number of runs can exclude every exception", 1.0)
         if self.metric == BEGINS:
             unfit = next((key for key in ("after", "window") if getattr(self, key) is not None), None)
             if unfit is not None or self.in_mode is None:
@@ -116,12 +118,12 @@ class RequirementTable(Table):
 
     @property
     def called(self) -> str:
-        """Its id, by default the metric's name."""
+        """The requirement's id, by default the metric's name."""
         return self.id or str(self.metric)
 
 
 KEYS = tuple(name for name in RequirementTable.model_fields if name not in ("attributes", "file"))
-"""The columns of requirements; any other is an attribute."""
+"""The keys of requirements, which name columns in files; any other column is an attribute."""
 ALIASES = {
     "identifier": "id",
     "object_identifier": "id",
@@ -129,7 +131,7 @@ ALIASES = {
     "object_text": "text",
     "reqif.text": "text",
 }
-"""Other tools' names for some of them, in lower case with underscores."""
+"""Names of some keys in other tools, in lower case with underscores."""
 
 
 def key_of(column: str) -> str | None:
@@ -140,7 +142,7 @@ def key_of(column: str) -> str | None:
 
 
 def column_of(table: RequirementTable) -> str:
-    """The name, among metrics that are measured, of the one that a requirement bounds."""
+    """Return the name, among the measured metrics, of the one that a requirement bounds."""
     if table.metric == CONE:
         return f"angle of {table.called}" if table.id else "cone_angle"
     if table.metric == BEGINS:
@@ -149,21 +151,21 @@ def column_of(table: RequirementTable) -> str:
 
 
 def is_of_a_part(table: RequirementTable) -> bool:
-    """Whether a requirement bounds the runs of a campaign in a mode or a window alone."""
+    """Return whether a requirement applies to a part of each run only: a mode or a time window."""
     parted = any(given is not None for given in (table.after, table.in_mode, table.window))
     return parted and table.method == "campaign" and table.metric != BEGINS
 
 
 def without_requirements(given: Any, method: Method) -> Any:
-    """Return a raw table; refuse it where it holds requirements that now belong in [[requirement]] tables of a method."""
+    """Return a raw table unchanged; refuse requirements in it, which now belong in [[requirement]] tables."""
     if isinstance(given, dict) and "requirement" in given:
         raise told_at("requirement", "an old key", f'[[requirement]] tables with id, metric and method = "{method}"')
     return cast(Any, given)
 
 
 def check_family(requirements: Sequence[RequirementTable]) -> None:
-    """Refuse requirements with equal ids, ignoring case, because columns have these names and SQL ignores it; unknown
-    parents; and those without a method from which none is derived."""
+    """Refuse requirements whose ids differ at most in case (ids name columns, and SQL ignores case), unknown parents, and
+    requirements with neither a method nor any derived from them."""
     ids = [requirement.called.casefold() for requirement in requirements]
     parents = {one.called: one.parent for one in requirements}
     for number, one in enumerate(requirements, 1):

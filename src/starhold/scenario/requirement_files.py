@@ -1,4 +1,4 @@
-"""Reads and writes requirements in files of other tools: CSV of a spreadsheet or of DOORS, and ReqIF."""
+"""Reads and writes requirements in files of other tools: CSV from spreadsheets or DOORS, and ReqIF."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SUFFIXES = (".csv", ".reqif")
 
 
 def read_requirement_file(path: Path) -> list[dict[str, Any]]:
-    """Return the raw [[requirement]] tables in a CSV or ReqIF file. InputError where it cannot be read as one."""
+    """Return the raw [[requirement]] tables of a CSV or ReqIF file. InputError where the file cannot be read as such."""
     where = str(path)
     try:
         data = path.read_bytes()
@@ -39,9 +39,9 @@ def read_requirement_file(path: Path) -> list[dict[str, Any]]:
 
 
 def write_requirement_file(tables: Sequence[RequirementTable], path: Path, original: Path | None = None) -> None:
-    """Write requirements as CSV or ReqIF, by the file's suffix, with their attributes. original: a ReqIF file whose content
-    is kept, except for requirements that differ. InputError for another suffix, and where the original is not ReqIF or
-    cannot be changed so."""
+    """Write requirements with their attributes as CSV or ReqIF, depending on the file's suffix. original: a ReqIF file that
+    is kept except for requirements that differ. InputError for another suffix, and where the original is not ReqIF or
+    cannot be changed as needed."""
     rows = [_row(table) for table in tables]
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES or (original is not None and suffix != ".reqif"):
@@ -71,12 +71,12 @@ def _csv_rows(data: bytes, where: str) -> list[dict[str, str]]:
     except UnicodeDecodeError:
         raise InputError(where, "", "text in another encoding", "CSV in UTF-8") from None
     head = text.partition("\n")[0]
-    # The separator that splits the heading into the most known columns.
+    # The separator is the one that splits the heading into the most known columns.
     separator = max(",;\t", key=lambda one: sum(key_of(name.strip('" \r')) is not None for name in head.split(one)))
     try:
         lines = [line for line in csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True) if any(line)]
     except csv.Error as error:
-        raise InputError(where, "", f"no CSV: {error}", "a table of a spreadsheet") from None
+        raise InputError(where, "", f"not CSV: {error}", "a table of a spreadsheet") from None
     columns = [name.strip() for name in lines[0]] if lines else []
     known = [key_of(name) or name for name in columns]
     if not {"id", "metric"} & {*known}:
@@ -96,7 +96,7 @@ def _csv_rows(data: bytes, where: str) -> list[dict[str, str]]:
 
 
 def _table(row: Mapping[str, str], key: str, where: str) -> dict[str, Any]:
-    """Return the raw table of a row of texts."""
+    """Return a row of texts as a raw [[requirement]] table."""
     table: dict[str, Any] = {}
     more: dict[str, str] = {}
     for column, text in row.items():
@@ -123,14 +123,14 @@ def _number(text: str) -> float | str:
 
 
 def _row(table: RequirementTable) -> dict[str, str]:
-    """Return the texts of a requirement by column, without absent values."""
+    """Return a requirement as texts by column, without absent values."""
     given = {key: getattr(table, key) for key in KEYS if key in table.model_fields_set and getattr(table, key) is not None}
     row = {key: value if isinstance(value, str) else json.dumps(value) for key, value in given.items()}
     return {"id": table.called} | row | dict(table.attributes)
 
 
 def with_files(data: Mapping[str, Any], folder: Path, where: str) -> dict[str, Any]:
-    """Return the raw tables of a scenario with the requirements of files in place of the tables that name them."""
+    """Return a scenario's raw tables, with each requirement table that names a file replaced by the requirements in it."""
     given = data.get("requirement")
     if not isinstance(given, list):
         return dict(data)

@@ -1,4 +1,4 @@
-"""The tables that scenarios of every body share, and those of laws."""
+"""The tables common to the scenarios of all bodies, and those of laws."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from starhold.scenario.tables import Name, Table, at_key, own_fields
 APART = ("law", "part")
 """Arrays of tables that are read one by one, each by its type."""
 MOST_STEPS = 1e12
-"""Beyond this many control steps rounding loses their count, and no run would end."""
+"""The most control steps of a run: beyond, rounding would lose their count and no run would end."""
 
 
 class ScenarioTable(Table):
-    """A whole file without its laws: a body's own class adds its tables, including a `simulation`."""
+    """A scenario file without its laws; a body's subclass adds its tables, including a `simulation`."""
 
     name: Annotated[Name, Field(description="name of results and folders")]
     description: Annotated[str, Field(description="a sentence for the report")] = ""
@@ -34,10 +34,10 @@ class ScenarioTable(Table):
     campaign: CampaignTable | None = None
     nominal: dict[str, dict[str, Any] | list[dict[str, Any]]] = Field(
         default={},
-        description="tables that laws assume and are designed for, in place of the file's own of that name",
+        description="tables that laws assume and are designed for, in place of the file's tables of the same names",
     )
     SHARED: ClassVar[Mapping[str, Any]] = MappingProxyType({})
-    """Return the keys that give a number to all parts that declare it as `shared`, with the default of each."""
+    """The keys that set a number of all parts that declare it as `shared`, with their defaults."""
 
     @model_validator(mode="after")
     def _requirements_fit(self) -> ScenarioTable:
@@ -52,23 +52,23 @@ class ScenarioTable(Table):
 
 
 class LawTable(Table):
-    """The keys of every law table besides the law's own gains; a body's own class adds to them."""
+    """The keys of every law table besides the law's own gains; a body's subclass adds its own."""
 
     type: str
     name: Annotated[Name | None, Field(description="its name in tables and folders; the type if absent")] = None
 
 
 class Timing(Table):
-    """The duration of a run and its steps; a body's own class gives the units."""
+    """The duration of a run and its time steps; a body's subclass gives the units."""
 
     unit: ClassVar[str] = ""
     """The unit of times in errors: a space and its name."""
     duration: float
     control_period: float
     substeps: Annotated[
-        int, *quantity(Gain("1", at_least=1, at_most=MOST_SUBSTEPS, whole=True, text="integration steps a control period"))
+        int, *quantity(Gain("1", at_least=1, at_most=MOST_SUBSTEPS, whole=True, text="integration steps per control period"))
     ] = 1
-    record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps a sample"))] = 1
+    record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps per recorded sample"))] = 1
 
     @model_validator(mode="after")
     def _fits(self) -> Timing:
@@ -89,10 +89,18 @@ class Timing(Table):
 class SeededTiming(Timing):
     """The duration in whole control periods, the steps, and the seed of the random numbers."""
 
-    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
+    seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="seed of all random numbers"))] = 1
     run: Annotated[
         int,
-        *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="in a campaign: each has its own random numbers")),
+        *quantity(
+            Gain(
+                "1",
+                at_least=0,
+                at_most=2**53,
+                whole=True,
+                text="number of the run in a campaign, which selects its random numbers",
+            )
+        ),
     ] = 0
 
     @model_validator(mode="after")
@@ -119,8 +127,8 @@ def columns(declared: Iterable[Parameter]) -> dict[str, Any]:
 
 @cache
 def law_model(law: Law, form: str | None, base: type[LawTable], shared: tuple[str, ...]) -> Any:
-    """Return the table of a law, or of one of its design forms; `base` has the keys common to such laws; shared: keys of the
-    scenario that give gains in its place."""
+    """Return the model of the table of a law, or of one of its design forms. base: the model of the keys common to such
+    laws; shared: scenario keys that set some of the gains instead."""
     entries: dict[str, Any] = {"type": (Literal[law.name], law.name)}
     if form is not None:
         entries["form"] = (Literal[form], form)

@@ -1,4 +1,4 @@
-"""Checks of the readings that a loop's parts take: of one sensor, or of several."""
+"""Checks whether a loop's parts take each reading from one sensor or from several."""
 
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
@@ -6,7 +6,7 @@ from starhold.parts.part import Fitted
 
 
 def check_sensors(loop: ClosedLoop, where: str) -> set[str]:
-    """Return the names of what the sensors read. InputError where two read what is taken of one only."""
+    """Return the names of the sensors' readings. InputError where two sensors give a reading that is taken from one only."""
     single = {*loop.law.reads} - {*getattr(loop.law.module, "SEVERAL", ())}
     single |= {name for fitted in loop.parts for name in fitted.part.reads}
     for estimator in loop.estimating:

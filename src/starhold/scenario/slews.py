@@ -1,4 +1,4 @@
-"""The `slew` table of a mode is read: the turn by which its target is reached as it begins."""
+"""Reads the `slew` table of a mode: the rotation to the mode's target when the mode begins."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TORQUE = Gain(
 
 
 class SlewTable(Table):
-    """The turn from the attitude that the craft has as a mode begins onto the mode's target."""
+    """The rotation from the craft's attitude when a mode begins to the mode's target."""
 
     rate: Annotated[Any, *quantity(RATE)]
     acceleration: Annotated[Any, *quantity(ACCELERATION)]
@@ -37,7 +37,7 @@ class SlewTable(Table):
 
 
 def slew_of(table: SlewTable | None, scenario: Scenario, key: str) -> Slew | None:
-    """The slew of a table, named `key` in errors; None for none. InputError for a cone that no axis has."""
+    """Return the slew of a mode's table, named `key` in errors, or None. InputError for a cone without a body axis."""
     if table is None:
         return None
     with input_at(scenario.where, key):

@@ -1,4 +1,4 @@
-"""Checks of estimators that another one starts."""
+"""Checks estimators that are initialized by another estimator."""
 
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
@@ -8,7 +8,7 @@ from starhold.scenario.checking import nearest, show
 
 
 def check_starts(loop: ClosedLoop, where: str) -> None:
-    """Raise InputError where an estimator cannot be started by the one that it names."""
+    """Raise InputError where an estimator cannot be initialized by the estimator that it names."""
     there = {fitted.called: fitted for fitted in loop.estimating}
     for one in loop.estimating:
         if not one.started_by:

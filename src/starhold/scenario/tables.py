@@ -1,4 +1,4 @@
-"""The base of all tables of a scenario file, their errors, and the parameters that a scenario gives to all its parts."""
+"""The base class of all tables of a scenario file, their errors, and parameters shared by all parts of a scenario."""
 
 from collections.abc import Collection, Iterable, Mapping
 from typing import Annotated, Any, TypeAlias
@@ -11,13 +11,13 @@ from starhold.parts.contract import Field as Parameter
 
 
 class Table(BaseModel):
-    """A table that refuses keys it does not know."""
+    """A table that refuses unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 Flag: TypeAlias = Annotated[bool, Field(strict=True)]
-"""true or false, and no word or number in their place."""
+"""A strict boolean: true or false, not a word or a number instead."""
 
 
 def refuse(reason: str) -> PydanticCustomError:
@@ -31,7 +31,7 @@ def at_key(key: str, reason: str, value: Any) -> PydanticCustomError:
 
 
 def told_at(key: str, given: str, allowed: str) -> PydanticCustomError:
-    """Return an error about one key of a table that is read, with a description of its value."""
+    """Return an error about one key of the table being read, with a description in place of its value."""
     return PydanticCustomError("told_at", "{reason}", {"reason": allowed, "key": key, "found": given})
 
 
@@ -53,26 +53,26 @@ Name: TypeAlias = Annotated[str, AfterValidator(check_name)]
 
 
 def own_fields(declared: Iterable[Parameter], shared: Collection[str]) -> list[Parameter]:
-    """Return the parameters of a part's own table, in a scenario with these shared keys."""
+    """Return the parameters that a part's own table holds, in a scenario with these shared keys."""
     return [item for item in declared if item.gain.shared not in shared]
 
 
 def values_of(declared: Iterable[Parameter], read: Any, shared: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters by name, from a validated table and the values of the shared keys."""
+    """Return the parameters of a part by name, from its validated table and the values of the shared keys."""
     return {
         item.name: shared[item.gain.shared] if item.gain.shared in shared else getattr(read, item.name) for item in declared
     }
 
 
 def shared_values(declared: Iterable[Parameter], values: Iterable[Any], shared: Collection[str]) -> dict[str, Any]:
-    """Return the values of the shared keys that give these parameters."""
+    """Return the values of those shared keys that set one of these parameters."""
     return {item.gain.shared: value for item, value in zip(declared, values, strict=True) if item.gain.shared in shared}
 
 
 def refuse_own(
     table: Mapping[str, Any], declared: Iterable[Parameter], shared: Collection[str], where: str, key: str
 ) -> None:
-    """Raise InputError where a raw table has a parameter that the scenario gives; `key`: the table's name in errors."""
+    """Raise InputError where a raw table sets a parameter that a shared key sets; `key`: the table's name in errors."""
     for item in declared:
         if item.name in table and item.gain.shared in shared:
             raise InputError(where, f"{key}.{item.name}", "a key that the whole flight shares", shared_key(item.gain.shared))

@@ -1,5 +1,5 @@
-"""Turns texts such as "0.01 N m" into numbers. Number and unit are parsed here, by a grammar that evaluates nothing; the
-units library only gives the conversion factors."""
+"""Converts texts such as "0.01 N m" to numbers. Numbers and units are parsed here, without evaluating expressions; the units
+library only supplies conversion factors."""
 
 import hashlib
 import re
@@ -23,7 +23,7 @@ _HALVES = re.compile(r"\^\((-?[13579])/2\)")
 _JOINT = re.compile(r"\s*[*·⋅/]\s*|\s+|[.-]")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _TOGETHER = re.compile(r"(?P<force>[nuµμmkM]?N)m(?P<time>s?)|(?P<mass>k?g)m")
-"""Units written together, as in mNm, Nms and kgm², which the library misreads."""
+"""Matches units without spaces, as in mNm, Nms and kgm², which the library misreads."""
 DECIBEL = "dB"
 _SHARES = {"%": "percent", "percent": "percent", "ppm": "ppm"}
 
@@ -49,8 +49,8 @@ COMMON = {
 
 
 def to_number(text: str, unit: str) -> float:
-    """Return the value of a text such as "20 mN m" in a unit such as "N m"; for "6 dB" the amplitude ratio, where the unit
-    is "1". ValueError says what is allowed."""
+    """Return the value of a text such as "20 mN m" in a unit such as "N m"; "6 dB" in the unit "1" gives the amplitude
+    ratio. ValueError says what is allowed."""
     text = text.strip()
     number = _NUMBER.match(text)
     if number is None or len(text) > LONGEST:
@@ -66,7 +66,7 @@ def to_number(text: str, unit: str) -> float:
 
 
 def to_either(text: str, unit: str, also: str) -> float:
-    """Return the value of a text in a unit, or in another unit with the same number; ValueError names both."""
+    """Return the value of a text in `unit`, or of a text in the unit `also` without conversion. ValueError names both."""
     for wanted in (unit, also):
         with suppress(ValueError):
             return to_number(text, wanted)
@@ -91,7 +91,7 @@ def _allowed(unit: str) -> str:
 
 @cache
 def _powers(given: str, unit: str) -> dict[str, float]:
-    """Return the units of a text with their exponents; `unit` is the one that errors name."""
+    """Return the units in a text with their exponents; `unit`: the unit named in errors."""
     given = re.sub(f"[{'⁰¹²³⁴⁵⁶⁷⁸⁹⁻'}]+", lambda raised: "^" + raised[0].translate(_RAISED), given)
     given = re.sub(r"\s*(?:\*\*|\^)\s*", "^", given)
     given = _HALVES.sub(lambda halves: f"^{int(halves[1]) / 2}", given)
@@ -102,7 +102,8 @@ def _powers(given: str, unit: str) -> dict[str, float]:
 
 
 def _read(given: str, unit: str) -> dict[str, float]:
-    """Yield factors from left to right; of a group in parentheses, which contains no other than a root's, all."""
+    """Return the units with their exponents, read factor by factor from left to right; parentheses are not nested, except
+    around a root."""
     powers: defaultdict[str, float] = defaultdict(int)
     over = _OVER.match(given)
     sign, place = (-1, over.end()) if over else (1, 0)
@@ -127,7 +128,7 @@ def _read(given: str, unit: str) -> dict[str, float]:
 
 
 def _split(name: str) -> list[str]:
-    """Return the units in a compound name; an exponent after it belongs to the last."""
+    """Return the units in a compound name; an exponent after it applies to the last one."""
     together = _TOGETHER.fullmatch(name)
     if together is None:
         return [name]
@@ -157,7 +158,7 @@ def _convert(value: float, powers: dict[str, float], unit: str) -> float:
 
 
 def _angle_fits(given: Any, wanted: Any) -> bool:
-    """Return whether radians appear where they must; 1/s is accepted for rad/s, but Hz, which may count turns, is not."""
+    """Return whether radians appear as the unit needs; 1/s is accepted for rad/s, but Hz, which may count turns, is not."""
     roots = [unit_registry().get_root_units(units)[1] for units in (given, wanted)]
     angle, wanted_angle = (root._units.get("radian", 0) for root in roots)
     if wanted_angle == 0 or angle == wanted_angle:
@@ -183,8 +184,8 @@ def _container(powers: dict[str, float]) -> Any:
 def unit_registry() -> Any:
     """Return the registry of units (pint), read from a cache on the disk where possible.
 
-    Pint's own cache folder is shared by every environment of the user, and its entries name files of the environment that
-    wrote them: when that one is deleted, all others fail. So this environment has a folder of its own."""
+    All Python environments of a user share pint's default cache folder, and its entries name files of the environment that
+    wrote them; if that one is deleted, all others fail. So each environment has its own folder here."""
     import pint
     import platformdirs
 

@@ -1,5 +1,5 @@
-"""The values of a scenario's keys, and of numbers with units there. Keys are written as for `Scenario.with_`. Values are
-validated: SI or scaled, like plain numbers in the file.
+"""The values of a scenario's keys, and conversion of other values to their units. Keys are written as for `Scenario.with_`.
+Values are validated numbers, SI or scaled, like plain numbers in the file.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,31 +29,31 @@ from starhold.scenario.tables import Table, refuse_own
 SHARED = ("name", "description", "requirement", "campaign", "simulation", "certify")
 """Tables and keys that all runs of a campaign share."""
 STRUCTURE = ("type", "name", "form", "file")
-"""Keys that identify a table."""
+"""Keys that determine which law or part a table describes."""
 PAIRS = {"attitude": "angles", "angles": "attitude"}
-"""Alternative keys of a table: giving one removes the other."""
+"""Alternative keys of a table: setting one removes the other."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A key of a scenario in which runs may differ, with its properties; it can be sent to other processes."""
+    """A key of a scenario in which runs may differ, with its properties; it can be pickled for other processes."""
 
     where: str
     """The scenario's name in errors."""
     key: str
     path: tuple[str | int, ...]
     gain: Gain | None
-    """Its declaration; None for a word or a boolean."""
+    """The declaration of the quantity; None for a word or a boolean."""
     value: Any
     """A number, tuples of numbers, a word or a boolean; None where the file has none."""
     shape: tuple[int, ...]
-    """() a number, (n,) a vector or a diagonal, (n, n) a matrix."""
+    """() for a number, (n,) for a vector or a diagonal, (n, n) for a matrix."""
     worth: float
-    """The SI value of a scaled number's unit; else 1."""
+    """The SI value of the unit of a scaled number; 1 for SI."""
     displaced: str | None
-    """The key that is removed where this one is given."""
+    """The key that is removed when this one is set."""
     table: str
-    """The name of its dispersion in [campaign.over]: this key, or several."""
+    """The name of its dispersion in [campaign.over]: this key, or several keys separated by commas."""
 
     @property
     def wordy(self) -> bool:
@@ -67,18 +67,18 @@ class Place:
 
     @property
     def bounds(self) -> Gain:
-        """The bounds of each of its numbers; none of a matrix's entries."""
+        """The bounds on each of its numbers; none for the entries of a matrix."""
         gain = self.gain
         if gain is None or gain.shape == (3, 3):
             return Gain()
         return Gain(above=gain.above, at_least=gain.at_least, at_most=gain.at_most)
 
     def change(self, value: Any) -> dict[str, Any]:
-        """Return the change that gives the key this plain value, for `Scenario.with_`."""
+        """Return the argument of `Scenario.with_` that sets the key to this plain value."""
         return {self.key: self._written(value)} | ({} if self.displaced is None else {self.displaced: None})
 
     def _written(self, value: Any) -> Any:
-        """Return the value as a file may hold it: with its unit where a plain number would be questioned."""
+        """Return the value as written in a file: with its unit where a plain number would be refused as implausible."""
         if isinstance(value, list):
             return [self._written(item) for item in cast(list[Any], value)]
         large = self.gain is not None and isinstance(value, float) and abs(value) > plain(self.gain)[0]
@@ -91,7 +91,7 @@ class Place:
 
 
 def accepted(scenario: Scenario, place: Place, value: Any, name: str = "") -> Any:
-    """Return the validated form of a value that fits the key's shape. InputError where the scenario refuses it there."""
+    """Return the validated value for a raw value of the key's shape. InputError where the scenario refuses it."""
     try:
         return locate(scenario.with_(place.change(value)), place.key).value
     except InputError as error:
@@ -102,8 +102,8 @@ def accepted(scenario: Scenario, place: Place, value: Any, name: str = "") -> An
 
 
 def width_at(place: Place, raw: Any, name: str = "", unit: str | None = None) -> NDArray[np.float64]:
-    """Return the numbers (of the key's shape) of a raw value that need not be within the key's bounds, such as a standard
-    deviation; in the key's unit, or in the one given. `name`: its name in errors."""
+    """Return the numbers (of the key's shape) of a raw value that may be outside the key's bounds, such as a standard
+    deviation, in `unit` or by default in the key's unit. `name`: its name in errors."""
     gain = place.gain or Gain()
     read: Callable[..., Any] = reader(Gain(gain.unit, also=gain.also) if unit is None else Gain(unit))
     worth = place.worth if unit is None else 1.0
@@ -126,7 +126,7 @@ def _each(raw: Any, number: Callable[[Any], float]) -> Any:
 
 
 def _filled(place: Place, raw: Any, shape: Sequence[int], name: str) -> Any:
-    """Return the raw value as lists of this shape; a single number applies to all."""
+    """Return the raw value as nested lists of this shape; a single number applies to all entries."""
     if not isinstance(raw, list | tuple):
         return raw if not shape else [_filled(place, raw, shape[1:], name) for _ in range(shape[0])]
     items = cast(Sequence[Any], raw)
@@ -150,7 +150,7 @@ def locate(scenario: Scenario, key: str) -> Place:
 
 
 def _no(given: str, allowed: str) -> InputError:
-    """Return an error about an invalid key; `locate` says which."""
+    """Return an error about an invalid key, to which `locate` adds the key's name."""
     return InputError("", "", given, allowed)
 
 
@@ -158,7 +158,7 @@ def _locate(scenario: Scenario, key: str, path: tuple[str | int, ...]) -> Place:
     model, value_of, (name, *rest) = _table_of(scenario, path)
     known = [item for item in model.model_fields if item not in STRUCTURE]
     if name in STRUCTURE:
-        raise _no("a key that says what a table is", "a key of a number or a word")
+        raise _no("a key that determines the kind of a table", "a key of a number or a word")
     if name not in model.model_fields:
         raise _no("an unknown key", nearest(str(name), known))
     gain, value = declared(model.model_fields[str(name)]), value_of(str(name))
@@ -179,11 +179,11 @@ def _locate(scenario: Scenario, key: str, path: tuple[str | int, ...]) -> Place:
 
 
 _Held: TypeAlias = tuple[type[Table], Callable[[str], Any], tuple[str | int, ...]]
-"""The model of a table, the values of its keys, and the rest of a path."""
+"""The model of a table, a function that gives the value of a key in it, and the rest of the path."""
 
 
 def _table_of(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
-    """Return the table on a path. InputError where there is none, or where the path ends there."""
+    """Return the table to which a path leads. InputError where there is none, or where the path ends with the table."""
     if path[0] in ("law", "part"):
         return _of_array(scenario, path)
     table: Any = scenario.table
@@ -212,7 +212,7 @@ def _numbered(there: Sequence[Any], name: str, after: Sequence[str | int]) -> An
 
 
 def _is_table(model: type[Any], name: str | int) -> bool:
-    """Return whether a key is that of a table, or of an array of tables, present or not."""
+    """Return whether a key of the model is a table or an array of tables, even if the file has none."""
     left: list[Any] = [model.model_fields[str(name)].annotation]
     while left:
         kind = left.pop()
@@ -223,7 +223,7 @@ def _is_table(model: type[Any], name: str | int) -> bool:
 
 
 def _of_array(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
-    """Return the table of a law or a part on a path."""
+    """Return the table of a law or a part to which a path leads."""
     array, after, shared = str(path[0]), path[1:], tuple(scenario.table.SHARED)
     if len(after) < 2:
         raise _no("a whole table", f"a key of one, such as {array}.NAME.KEY")
@@ -243,7 +243,7 @@ def _of_array(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
 
 
 def _of_mode(entry: LawEntry, numbers: dict[str, Any], after: tuple[str | int, ...], shared: tuple[str, ...]) -> _Held:
-    """Return the table of a mode, or of one of its conditions, on a path."""
+    """Return the table of a mode, or of one of its conditions, to which a path leads."""
     laws = [law for _, law, _ in mode_laws(entry.law, entry.gains)]
     law, way = _numbered(laws, "mode", after or ("",)), after[1:]
     model, begun = law_model(law, None, ModeTable, shared), f"mode[{int(after[0]) + 1}]."
@@ -255,7 +255,7 @@ def _of_mode(entry: LawEntry, numbers: dict[str, Any], after: tuple[str | int, .
 
 
 def _of_monitor(monitors: Sequence[Monitor], numbers: dict[str, Any], after: tuple[str | int, ...]) -> _Held:
-    """The table of a monitor that a path leads to."""
+    """Return the table of a monitor to which a path leads."""
     monitor: Monitor = _numbered(monitors, "monitor", after or ("",))
     if len(after) < 2:
         raise _no("a whole table", "one of its keys")
@@ -264,7 +264,7 @@ def _of_monitor(monitors: Sequence[Monitor], numbers: dict[str, Any], after: tup
 
 
 def _plainly(gain: Gain | None, value: Any) -> Any:
-    """Return numbers as tuples, and the word itself in place of its number."""
+    """Return numbers as nested tuples, and a choice as its word, not its number."""
     if gain is not None and gain.choices and isinstance(value, int):
         return gain.choices[value]
     return _tuples(value.tolist()) if isinstance(value, np.ndarray) else value
@@ -275,7 +275,7 @@ def _tuples(value: Any) -> Any:
 
 
 def _formed(gain: Gain | None, value: Any, raw: Any) -> tuple[Any, tuple[int, ...]]:
-    """Return the value and its shape; for a matrix as in the file: all of it, or its diagonal."""
+    """Return the value and its shape; of a matrix, the whole or only the diagonal, as the file gives it."""
     if gain is None or len(gain.shape) < 2:
         return value, () if gain is None else gain.shape
     rows = isinstance(raw, list) and any(isinstance(row, list) for row in cast(list[Any], raw))
@@ -298,7 +298,7 @@ def _component(value: Any, shape: tuple[int, ...], rest: Sequence[str | int]) ->
 
 
 def _raw_at(tables: Any, path: Sequence[str | int]) -> Any:
-    """Return the value of raw tables at a path, or None."""
+    """Return the value at a path of raw tables, or None."""
     here: Any = tables
     for part in path:
         try:

@@ -20,7 +20,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """Write tables as TOML that reads back the same; InputError where a text holds half a character."""
+    """Return tables as TOML that reads back unchanged. InputError where a text contains half of a surrogate pair."""
     lines = [f"{_key(name)} = {_value(item)}" for name, item in tables.items() if not _is_table(item)]
     for name, item in tables.items():
         if _is_table(item):
@@ -50,13 +50,12 @@ def _value(value: Any) -> str:
         return "{" + ", ".join(f"{_key(name)} = {_value(item)}" for name, item in value.items()) + "}"
     if isinstance(value, list):
         return f"[{', '.join(map(_value, value))}]"
-    # Finite floats, infinity and NaN are written alike in both languages except for capitals.
+    # TOML writes finite floats, infinity and NaN as JSON does, except for capitals.
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def law_table(law: Law, gains: Any) -> str:
-    """Write a [[law]] table with these gains, exactly: floats read back as the same numbers; without gains that the scenario
-    gives to all parts."""
+    """Return a [[law]] table with these gains, without those set by shared keys; floats read back exactly."""
     which = f'type = "{law.name}"' if law.file is None else f"file = {json.dumps(str(law.file))}"
     lines = ["[[law]]", which]
     for item, value in _own(law.fields(), gains, body_for(law).tables.SHARED):
@@ -66,7 +65,7 @@ def law_table(law: Law, gains: Any) -> str:
 
 
 def scenario_with(law: Law, gains: Any) -> str:
-    """Write a small scenario of a law's body, with this law alone and the sensors that it reads."""
+    """Return a small scenario of a law's body, as TOML, with this law alone and the sensors that it reads."""
     body, sensors = body_for(law), telling(law.reads)
     given = shared_values(law.fields(), gains, body.tables.SHARED)
     orbits = bool(given) or any("two-body" in sensor.part.needs for sensor in sensors)
@@ -81,8 +80,7 @@ def scenario_with(law: Law, gains: Any) -> str:
 
 
 def part_table(part: Part, params: Any) -> dict[str, Any]:
-    """Write a [[part]] table with these parameters, without infinite and empty ones and those that the scenario gives to all
-    parts."""
+    """Return a [[part]] table with these parameters, without infinite or empty ones and those set by shared keys."""
     table: dict[str, Any] = {"type": part.name} if part.file is None else {"file": str(part.file)}
     body = bodies().get(part.body or "rigid-body")
     for item, value in _own(part.fields(), params, body.tables.SHARED if body else ()):
@@ -93,10 +91,10 @@ def part_table(part: Part, params: Any) -> dict[str, Any]:
 
 
 def _own(declared: list[Field], values: Iterable[Any], shared: Collection[str]) -> list[tuple[Field, Any]]:
-    """Return the parameters of a part's own table, with their values."""
+    """Return the parameters that a part's own table holds, with their values."""
     return [(item, value) for item, value in zip(declared, values, strict=True) if item.gain.shared not in shared]
 
 
 def template_text(body: str) -> str:
-    """Return a commented scenario, of the body of this name, that runs as it is and names every key."""
+    """Return a commented scenario for the body of this name, which runs as it is and names every key."""
     return bodies()[body].template

@@ -1,4 +1,4 @@
-"""The hooks through which studies handle a body, and how they are found by the body's name."""
+"""The interface through which studies handle a body, and its look-up by the body's name."""
 
 from __future__ import annotations
 
@@ -25,88 +25,91 @@ Cones: TypeAlias = Mapping[str, Any]
 """Body axes with the directions that they must avoid, by the names of their metrics."""
 NO_CONES: Cones = MappingProxyType({})
 Values: TypeAlias = dict[str, tuple[Any, str]]
-"""Values with their units ("1" for none), by name."""
+"""Values and their units ("1" for dimensionless), by name."""
 
 
 class Issued(NamedTuple):
-    """A certificate, its loop, without later faults, and the control step from which that flies."""
+    """A certificate, its loop without later faults, and the control step at which this loop begins to fly."""
 
     certificate: Certificate
     loop: Any
     step: int = 0
     mode: int | None = None
-    """The mode that it is about, in a flight with modes, counted from 1."""
+    """The mode that the certificate is about, counted from 1, for a law with modes."""
     before: int | None = None
     """The previous mode, for a certificate about its hand-over."""
 
 
 class BodyStudy:
-    """All that flying, measuring and certifying need of a body; each module of `starhold.studies.bodies` holds one `STUDY`.
-    This base class is the study of any body: it flies and measures what the part records, in the units of the recording, and
+    """The interface to a body for flights, metrics and certificates; each module of `starhold.studies.bodies` holds one
+    `STUDY`. This base class serves any body: it flies and measures the recorded quantities in their recorded units, and
     claims nothing."""
 
     EXTRAS: tuple[str, ...] = ()
     """Metrics that are measured only on request."""
     CLAIMS = TRIALS = ""
-    """The modules whose functions compare claims with starts, and try them by flights; "" for a body without claims."""
+    """The modules with the functions that compare claims with initial states, and test them by flights; "" for a body
+    without claims."""
 
     def name_samples(self, scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Recording:
-        """Name the samples of `fly`; the attributes hold the numbers that metrics need."""
+        """Return the samples of `fly` as a recording, with the numbers that metrics need among its attributes."""
         return label(loop, samples, carry, scenario.table.simulation.record_every)
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
-        """Measure a recorded run; `diverged_at` (s) is None for a motion that did not diverge."""
+        """Return the metrics of a recorded run; `diverged_at` (s) is None for a motion that did not diverge."""
         return any_body.measure(run)
 
     def measure_required(self, run: Recording, cones: Cones) -> dict[str, Any]:
-        """Measure a recorded run, or a part of it, for requirements: with extras and cones, as `meter` does."""
+        """Return the metrics of a recorded run, or of a part of it, for requirements: with extras and cones as in
+        `meter`."""
         return self.metrics_of(run)
 
     def meter(self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES) -> Meter:
-        """Make the meter that measures many flights as they fly, as `metrics_of` measures recordings of every control step.
-        gains: those of all lanes, with an array (lanes,) in place of each number that differs; extras: metrics that are
-        measured only on request; cones: axes with the directions that they must avoid, by the names of their metrics.
-        ValueError where the body lacks any of these."""
+        """Return the meter that computes the metrics of many flights in the kernel; they equal those of `metrics_of` for
+        recordings of every control step. gains: those of all lanes, with an array (lanes,) in place of each number that
+        differs; extras: metrics measured only on request; cones: axes with the directions that they must avoid, by the names
+        of their metrics. ValueError where the body lacks any of these."""
         nothing_more(extras, cones)
         clock = getattr(loop.body.module, "TIME_UNIT", "s")
         return any_body.make_meter(recorded_of(loop), scenario.table.simulation.steps, loop.period, clock)
 
     def metric_set(self, run: Recording) -> MetricSet:
-        """Return how metrics of such runs are shown and ranked."""
+        """Return the rules by which the metrics of such runs are shown and ranked."""
         return any_body.metric_set(run)
 
     def state_names(self, run: Recording) -> Sequence[str]:
-        """Name the recorded quantities that are integrated."""
+        """Return the names of the recorded quantities that are integrated states."""
         return [name for name in run.columns if name in run.arrays]
 
     def resources(self, entry: LawEntry) -> Values:
-        """List the options of a law besides its gains."""
+        """Return the options of a law besides its gains, with units."""
         return {}
 
     def compile_calls(self, loop: Any) -> None:
-        """Compile the law's calls, so that `call_costs` can time them at once."""
+        """Compile the law's calls in advance, so that `call_costs` need only time them."""
 
     def call_costs(self, loop: Any, run: Recording) -> dict[str, float]:
-        """Time the law's calls; empty where that is of no interest."""
+        """Return the times of the law's calls; empty where they are of no interest."""
         return {}
 
     def certify(self, scenario: Scenario, entry: LawEntry, loop: Any, pointing: bool = False) -> list[Issued]:
-        """Certify one law, initially and after each change that it knows of; pointing: also how near to its target."""
+        """Return the certificates of one law, initially and after each change that it knows of; pointing: whether to prove
+        the pointing bound too."""
         # A certificate without claims is undecided.
         return [Issued(Certificate(entry.name, {"body": scenario.body, "law": entry.law.name}, ()), loop)]
 
     def departures(self, issued: Issued, loop: Any, run: Recording) -> Mapping[str, tuple[Departure, ...]]:
-        """Describe how a run leaves the proved claims of a certificate, by their kinds."""
+        """Return the departures of a run from the proved claims of a certificate, by kind of claim."""
         return {}
 
     def covered(self, issued: Issued, loop: Any, run: Recording) -> tuple[tuple[float, float], ...]:
-        """Return the times (s) between which the claim about the loop as it flies covers a run, for each time that the
+        """Return the intervals (s) in which the claim about the loop as it flies covers a run, one for each time that the
         claim's loop flies; empty where it never does."""
         return ()
 
     def ends(self, issued: Issued, loop: Any, time: float) -> int | None:
-        """Return the control step at which a flight of this duration (s) has another loop than a certificate is about; None
-        where it keeps it."""
+        """Return the control step at which the loop of a flight of this duration (s) ceases to be the certificate's, or
+        None."""
         return None
 
     def fly_claims(self, issued: Issued) -> Trial | None:
@@ -119,7 +122,7 @@ class BodyStudy:
 
 
 def study_of(body: str) -> BodyStudy:
-    """Return the study of the body of this name, or the study for any body where it has none."""
+    """Return the study of the body of this name, or the general one if the body has no study of its own."""
     return body_module("starhold.studies.bodies", body).STUDY
 
 
@@ -132,7 +135,7 @@ def nothing_more(extras: Sequence[str], cones: Cones) -> None:
 
 
 def body_module(package: str, body: str) -> Any:
-    """Return the module of a package that is named after a body, else its `any_body`."""
+    """Return the module of a package named after a body, or by default its `any_body`."""
     name = f"{package}.{body.replace('-', '_')}"
     there = body.replace("-", "").isalnum() and find_spec(name) is not None
     return import_module(name if there else f"{package}.any_body")

@@ -55,15 +55,15 @@ if TYPE_CHECKING:
 
 LOOP, TOGETHER, COMBINED = "the loop itself", "all together", "root sum square"
 SMALL = math.radians(5.0)
-"""Rotation vectors up to this size (rad) add, to within a twentieth of their size."""
+"""Rotation vectors up to this size (rad) can be added with an error of less than a twentieth of their size."""
 MOST = 5_000_000
-"""The most errors that are kept of one batch of runs."""
+"""The most error samples kept from one batch of runs."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How errors are sampled: from which time on (s), the length of windows (s), the separation of windows for drift (s),
-    the share of the errors below a level and its statistical interpretation, the number of runs, and the line of sight."""
+    """The settings of a budget: the time (s) from which errors count, the length of windows (s), the separation (s) of a
+    drift's windows, the share of errors below a level with its interpretation, the number of runs, and the line of sight."""
 
     start: float
     window: float
@@ -81,14 +81,13 @@ class Contribution:
     name: str
     kind: Literal["loop", "source", "combined", "together"]
     figures: Mapping[str, Mapping[str, Figures]]
-    """Level, mean and standard deviation (rad) of an index ("APE", "MPE", "RPE", "PDE"; with an estimator "AKE", "MKE",
-    "RKE", "KDE" of its error) about an axis ("x", "y", "z", "angle" for any axis, "line of sight" with a boresight)."""
+    """Level, mean and standard deviation (rad), by index ("APE", "MPE", "RPE", "PDE"; with an estimator "AKE", "MKE", "RKE",
+    "KDE" of its error) and axis ("x", "y", "z", "angle" for the total angle, "line of sight" with a boresight)."""
 
 
 @dataclass(frozen=True)
 class Budget:
-    """The pointing errors of a law by source. Levels are those of the line of sight where there is one, else of the total
-    angle."""
+    """The pointing errors of a law by source. Levels are of the line of sight if there is one, else of the total angle."""
 
     scenario: str
     law: str
@@ -96,9 +95,9 @@ class Budget:
     rows: tuple[Contribution, ...]
     """Rows: the loop itself, each source, their root sum square, all together."""
     required: Mapping[str, float]
-    """The largest level (rad) of an index that is allowed, by the index."""
+    """The largest level (rad) allowed for each index with a requirement."""
     proof: ProvedPointing | None = None
-    """The proved bound of the pointing error, with each source's share, where a proof was requested."""
+    """The proved bound on the pointing error, with each source's share, where a proof was requested."""
 
     @property
     def axis(self) -> str:
@@ -165,17 +164,17 @@ class Source(NamedTuple):
 def study(
     scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
 ) -> Budget:
-    """Fly a law of a scenario without any source of error, with each of them alone, and with all of them, always without
-    faults. A source's contribution is the difference that it makes to the error of the loop without sources, run by run and
-    instant by instant. `notice` is called with the number done, the total, and the next flight. InputError where nothing
-    disturbs the loop, the windows do not fit into the run, or a motion diverges.
+    """Return the pointing error budget of a law of a scenario, from flights without any error source, with each source
+    alone, and with all of them, always without faults. A source's contribution is the difference, run by run and instant by
+    instant, between the errors with this source and without any. `notice` is called with the number done, the total, and the
+    next flight. InputError where nothing disturbs the loop, the windows do not fit into the run, or a motion diverges.
     """
     required = {one.metric.upper(): one.bound for one in check_budget(scenario)}
     scenario = faultless(scenario)
     disturbing, clock = sources(scenario), _Clock.of(scenario)
     if not disturbing:
         allowed = "noise, a torque, wheel friction or another source of error"
-        raise InputError(scenario.where, "", "nothing that disturbs the loop", allowed)
+        raise InputError(scenario.where, "", "no disturbance of the loop", allowed)
     names = (LOOP, *(source.name for source in disturbing), TOGETHER)
     flown: list[tuple[Array, Array | None]] = []
     for done, name in enumerate(names):
@@ -191,7 +190,7 @@ def study(
     apart = spacing(runs, instants, clock.length)
     if apart > 1:
         period, share = clock.settings.window / clock.length, shortfall(apart, clock.length)
-        seen = f"relative errors are taken over windows that begin every {apart * period:g} s, not every {period:g} s"
+        seen = f"relative errors are computed over windows that begin every {apart * period:g} s, not every {period:g} s"
         warnings.warn(f"{scenario.where}: {seen}: the largest may be up to {share:.1%} too small", stacklevel=2)
     still, rows = flown[0], list[Contribution]()
     for name, errors in zip(names, flown, strict=True):
@@ -208,12 +207,12 @@ def study(
 
 
 def faultless(scenario: Scenario) -> Scenario:
-    """Return the scenario as flown for its budget."""
+    """Return the scenario as flown for its budget, without faults."""
     return scenario.about("rigid-body").with_({"fault": None, "campaign": None, "requirement": None})
 
 
 def without(scenario: Scenario, entry: LawEntry, away: Sequence[Source]) -> ClosedLoop:
-    """Return the loop of a law without some sources; estimators go on to assume that they are there."""
+    """Return the loop of a law without some sources; estimators still assume that they are present."""
     changes = {key: value for source in away for key, value in source.without.items()}
     gone = {f.part.name for f in scenario.parts if changes.get(f"part.{f.called}", ...) is None}
     changed, assuming = scenario.with_(changes), {f.called: f for f in scenario.parts if f.part.role == "estimator"}
@@ -222,15 +221,15 @@ def without(scenario: Scenario, entry: LawEntry, away: Sequence[Source]) -> Clos
 
 
 def check_budget(scenario: Scenario) -> tuple[Requirement, ...]:
-    """Return the requirements that the budget of a scenario decides. InputError where one is not an upper bound on the level
-    of an index, such as "ape", and where an index needs an estimator that is absent."""
+    """Return the requirements that the budget of a scenario decides. InputError for a requirement that is not an upper bound
+    on the level of an index, such as "ape", and for an index that needs an estimator where there is none."""
     tables = tables_of(scenario, "budget")
     known = PERFORMANCE if all(fitted.role != "estimator" for fitted in scenario.parts) else MEANINGS
     return at_most(scenario, tables, dict.fromkeys([index.lower() for index in known], "rad"))
 
 
 def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
-    """Return a law whose modes, if any, do not name removed effectors."""
+    """Return the law with removed effectors also removed from its modes."""
     module: Any = entry.law.module
     if not isinstance(module, Modes):
         return entry
@@ -240,9 +239,8 @@ def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
 
 
 def sources(scenario: Scenario) -> tuple[Source, ...]:
-    """List the sources that disturb the loops of a scenario: torques, moving parts without a command, friction of wheels,
-    and the nonzero parameters of a sensor that may be zero, except times. Actuators, estimators and sampling belong to the
-    loop."""
+    """Return the error sources of a scenario's loops: torques, moving parts without a command, friction of wheels, and the
+    nonzero parameters of sensors that may be zero, except times. Actuators, estimators and sampling belong to the loop."""
     disturbing = [
         Source(key.replace("_", " "), {f"{name}.{key}": type(value)()})
         for name in ("environment", "sensor")
@@ -283,12 +281,12 @@ def _errors_of(fitted: Fitted) -> dict[str, Any]:
 
 def _may_be_zero(gain: Parameter) -> bool:
     plain = not (gain.whole or gain.choices or gain.columns)
-    # Delays and intervals shape the loop: without them the same noise would have another effect.
+    # Delays and intervals belong to the loop: without them the same noise would have a different effect.
     return plain and gain.unit != "s" and gain.above is None and (gain.at_least or 0.0) <= 0.0 <= (gain.at_most or 0.0)
 
 
 class _Clock(NamedTuple):
-    """When errors are sampled: control steps of a run and a sample, the first sample, samples of a window and of a drift."""
+    """The sampling of errors: control steps per run and per sample, the first sample, samples per window and per drift."""
 
     settings: Settings
     steps: int
@@ -331,7 +329,7 @@ class _Clock(NamedTuple):
 
 
 class _Noted(NamedTuple):
-    """Return the error of the attitude, and that of its estimate, as rotation vectors (rad, body axes)."""
+    """The error of the attitude and that of its estimate, as rotation vectors (rad, body axes)."""
 
     error: Any
     knowledge: Any
@@ -339,7 +337,7 @@ class _Noted(NamedTuple):
 
 @cache
 def _note(parts: Composition, knows: bool) -> Any:
-    """Return the equations of the errors; one function for loops that one kernel flies."""
+    """Return the equations of the errors; loops that one kernel flies share one function."""
     read = sampled(parts)
 
     def note(seen: Any, decided: Any, carry: Any, step: Any, setup: Any, numbers: Any) -> _Noted:
@@ -367,7 +365,7 @@ def _flown(scenario: Scenario, loop: ClosedLoop, entry: LawEntry, clock: _Clock,
     def work(piece: range) -> None:
         done, span = 0, slice(piece.start, piece.stop)
         for place, instant in enumerate(instants):
-            # Up to the instant and the step that begins there, whose notes remain.
+            # Up to the sampled instant and through the step that begins there, whose errors are recorded.
             batch.fly(phase, piece, done, instant + 1 - done)
             done = instant + 1
             noted[span, :, place] = batch.noted[span].swapaxes(1, 2)

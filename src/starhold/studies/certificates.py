@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 class Tried(NamedTuple):
-    """A certificate, the flights that tested it (None: it claims nothing that can be flown), and for each kind of claim
-    about a set whether the scenario starts inside it."""
+    """A certificate, the flights that tested it (None: it has no claim that flights can test), and for each kind of claim
+    about a set, whether the scenario starts inside the set."""
 
     certificate: Certificate
     trial: Trial | None
@@ -30,7 +30,7 @@ class Tried(NamedTuple):
 
 
 def compare_programs(path: Path, scenario: Scenario) -> list[str]:
-    """Describe how the proofs of a checked file are about other loops than those of a scenario; empty where they are not."""
+    """Return the differences between the loops that the proofs of a checked file are about and those of a scenario."""
     from starhold.certification.comparison import differences, station_differences
     from starhold.studies.bodies.rigid_body import certified_loops, handed_over
 
@@ -65,7 +65,8 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
 
 
 def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
-    """Certificates of all laws of a scenario, or of one. Raises `BrokenClaimError` where a flight contradicts one."""
+    """Return the certificates of all laws of a scenario, or of one. Raises `BrokenClaimError` if a flight contradicts
+    one."""
     study, entries = study_of(scenario.body), scenario.laws if law is None else (scenario.pick(law),)
     if scenario.supposed is not None:
         raise InputError(

@@ -1,4 +1,5 @@
-"""The chain of a mission's modes: whether what is proved of a mode as it flies begins where the mode before ends."""
+"""The chain of a mission's modes: whether the claim about each mode as it flies covers all states in which the previous mode
+ends."""
 
 from __future__ import annotations
 
@@ -25,10 +26,10 @@ if TYPE_CHECKING:
 
 
 class Link(NamedTuple):
-    """A switch to the next mode, with the modes' names. rate, angle, momentum: up to which the next mode begins (rad/s, rad,
-    relative to its target, N m s), inf where nothing bounds them; claim: what is proved of the next mode as it flies, if
-    anything; assumed: under which that is so; lacks: why the claim does not begin there; heavy: whether only the momentum is
-    too large for it; wide: whether the claim is the one with the momentum that is handed over; name: that of the switch."""
+    """A switch to the next mode, with the modes' names. rate, angle, momentum: bounds on the state in which the next mode
+    begins (rad/s, rad, both relative to its target, N m s), inf for none; claim: the claim about the next mode as it flies,
+    if any; assumed: its further assumptions; lacks: the reasons why it does not cover these states; heavy: whether only the
+    momentum is too large for it; wide: whether it is the claim made for this momentum; name: that of the switch."""
 
     before: str
     after: str
@@ -44,7 +45,7 @@ class Link(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Say whether the next mode takes over, and what is proved of it then."""
+        """A sentence on whether the next mode is proved to take over, and on what is proved about it then."""
         if self.claim is None or self.lacks:
             return f"not taken over: {listed(self.lacks)}"
         given = f", assuming that {listed(self.assumed)}" if self.assumed else ""
@@ -58,8 +59,8 @@ class Link(NamedTuple):
 
 
 def links_of(loop: ClosedLoop, name: str, certificates: Mapping[str, Certificate]) -> list[Link]:
-    """Return the links of a law's modes, from the first mode on as it reaches the others, from the certificates of the modes
-    and of the switches by name; switches back are none. A mode has two links where it is left from either of its claims."""
+    """Return the links of a law's modes, starting with the first mode, from the certificates of the modes and switches by
+    name; switches back are not links. A mode with two claims has two links to the next one."""
     modes = [mode.name for mode in loop.law.module.modes]  # pyright: ignore[reportAttributeAccessIssue]
     flown: dict[str, Claim | None] = {mode: _flown(certificates.get(f"{name}: {mode}")) for mode in modes}
     switches = [one for one in hand_overs(loop, name) if one.key == "until"]
@@ -87,8 +88,8 @@ def links_of(loop: ClosedLoop, name: str, certificates: Mapping[str, Certificate
 
 
 def widened(loop: ClosedLoop, name: str, issued: Sequence[Issued], wanted: Wanted) -> list[Issued]:
-    """Return the certificates of a law's modes, with a further claim, in the certificate of the switch, of each mode as it
-    flies that a switch begins with more momentum than its claim is about: from the same start, with that momentum."""
+    """Return the certificates of a law's modes. Where a switch may hand over more momentum than the next mode's claim
+    assumes, the certificate of the switch gets a further claim about this mode as it flies, with that momentum."""
     every, tried = list(issued), set[str]()
     switches = {one.name: one for one in hand_overs(loop, name) if one.key == "until"}
 
@@ -113,14 +114,13 @@ def widened(loop: ClosedLoop, name: str, issued: Sequence[Issued], wanted: Wante
 
 
 def summary(links: Sequence[Link]) -> str:
-    """Say of how many switches the next mode is proved to take over as the loop flies."""
+    """Return a clause that counts the switches at which the next mode is proved to take over as the loop flies."""
     taken = sum(not link.lacks for link in links)
     return f"as it flies, {taken} of {len(links)} switches between modes lead into what is proved of the next mode"
 
 
 def sentence(links: Sequence[Link]) -> str:
-    """Say in one sentence what the links prove one after another, up to the first one that lacks something; empty if that is
-    the first."""
+    """Return one sentence with what consecutive links prove, up to the first incomplete one; "" if that is the first."""
     follows = (k == 0 or link.before == links[k - 1].after for k, link in enumerate(links))
     taken = [link for link, _ in takewhile(lambda pair: not pair[0].lacks and pair[1], zip(links, follows, strict=True))]
     if not taken:
@@ -128,7 +128,7 @@ def sentence(links: Sequence[Link]) -> str:
     steps, assumed, shares = dict[str, None](), dict[str, None](), dict[str, None]()
     for link in taken:
         n = link.claim.numbers  # pyright: ignore[reportOptionalMemberAccess]
-        # What repeats itself is said once.
+        # Repeated clauses appear once.
         steps[f"{link.after} comes within {np.degrees(n['angle']):.3g}° after {n['settling']:.4g} s"] = None
         assumed |= dict.fromkeys(link.assumed)
         if n["share"]:
@@ -164,8 +164,8 @@ def _flown(certificate: Certificate | None) -> Claim | None:
 
 
 def _link(one: HandOver, before: str, after: str, last: Claim | None, claim: Claim | None, begun: float) -> Link:
-    """Return the link of a switch. last, claim: of the mode before and the next one; begun: the momentum with which the mode
-    before begins (N m s)."""
+    """Return the link of a switch. last, claim: the claims about the previous and the next mode; begun: the momentum
+    (N m s) with which the previous mode begins."""
     early = _is_early(one, begun)
     rate, angle = flown_ends(one.levels, one.before, one.after, None if early else last, claim)
     momentum = _momentum(one, last, rate)
@@ -190,7 +190,7 @@ def _is_early(one: HandOver, begun: float) -> bool:
 
 
 def _unending(one: HandOver, before: str, last: Claim) -> list[str]:
-    """Return what must be assumed for a mode to end that has settled; nothing of one that is as good if it does not."""
+    """Return the assumptions needed for a settled mode to end; none where it is no worse if the mode does not end."""
     n = last.numbers
     rate = n["rate"] + n["rate_error"]
     settled = {"angle_below": n["angle"] + n["attitude_error"], "rate_below": rate, STORED: -inf}
@@ -202,9 +202,8 @@ def _unending(one: HandOver, before: str, last: Claim) -> list[str]:
 
 
 def _momentum(one: HandOver, last: Claim | None, rate: float) -> float:
-    """Return the largest momentum with which a mode begins (N m s): that of the claim about the mode before, or that at
-    which the switch happens; or that of the rotors at the start, which they keep in a mode in which wheels are inactive, and
-    the body's."""
+    """Return the largest momentum (N m s) with which a mode begins: the bound of the claim about the previous mode, or that
+    of the switch; or, after a mode with inactive wheels, the initial momentum of the rotors plus that of the body."""
     # The rate is relative to the target.
     fastest = rate + above(make_subject(one.after).target_rate)
     fresh = fresh_momentum(one, fastest)
@@ -214,7 +213,8 @@ def _momentum(one: HandOver, last: Claim | None, rate: float) -> float:
 
 
 def _lacking(before: str, after: str, claim: Claim | None, rate: float, angle: float) -> list[str]:
-    """Return why the claim of the next mode does not begin where the mode before ends, its momentum aside."""
+    """Return the reasons, apart from momentum, why the next mode's claim does not cover the states in which the previous
+    mode ends."""
     if claim is None:
         return [f"nothing is proved of {after} as it flies"]
     n, clauses = claim.numbers, list[str]()
@@ -229,7 +229,7 @@ def _lacking(before: str, after: str, claim: Claim | None, rate: float, angle: f
 
 
 def _heavy(after: str, claim: Claim, momentum: float) -> list[str]:
-    """Return that the next mode may begin with more momentum than its claim is about, if it may."""
+    """Return a clause if the next mode may begin with more momentum than its claim assumes; else an empty list."""
     most = claim.numbers.get("momentum", inf)
     stored = "any" if momentum == inf else f"{1e3 * momentum:.3g} mN m s of"
     clause = f"{after} may begin with {stored} momentum, and is proved with up to {1e3 * most:.3g} mN m s"

@@ -1,4 +1,4 @@
-"""Flies the laws of a scenario on any body, and measures and certifies them."""
+"""Flies, measures and certifies the laws of a scenario on any body."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -18,12 +18,12 @@ from starhold.studies.modes import epoch_of, modes_flown, never_begun
 from starhold.version import __version__
 
 Notice: TypeAlias = Callable[[str, int, int], None]
-"""Called with a law's name, the control steps done and their total."""
+"""Called with a law's name, the number of control steps done and their total."""
 
 
 def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = None, process: str | None = None) -> Flight:
-    """Fly and measure one law of the scenario, in the loop that `build` gives; process: a program that commands in place of
-    the law."""
+    """Return the measured flight of one law of the scenario in a loop from `build`; process: a program that commands in
+    place of the law."""
     study = study_of(scenario.body)
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     run, carry = _flown(scenario, loop, progress, process)
@@ -38,18 +38,19 @@ def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = N
 
 
 def timed(scenario: Scenario, loop: Any, flight: Flight) -> Flight:
-    """Return the flight with the cost of a call of its law, which is accurate only on an idle machine."""
+    """Return the flight with the time per call of its law among its metrics, which is accurate only on an idle machine."""
     return costing(flight, study_of(scenario.body).call_costs(loop, flight.recording))
 
 
 def costing(flight: Flight, costs: dict[str, float]) -> Flight:
-    """Return the flight with these costs of a call of its law among its metrics."""
+    """Return the flight with these times per call of its law among its metrics."""
     return replace(flight, metrics=flight.metrics | costs)
 
 
 def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight, pointing: bool = False) -> Flight:
-    """Return the flight with the certificates of its law, and how it leaves their claims; without either where the law's
-    nominal model is not the craft. pointing: also look for the claim about the loop as it flies, which takes seconds."""
+    """Return the flight with the certificates of its law and its departures from their claims; without both where the law's
+    nominal model differs from the craft. pointing: whether to seek the claim about the loop as it flies, which takes
+    seconds."""
     study = study_of(scenario.body)
     certified = [] if loop.nominal is not None else study.certify(scenario, entry, loop, pointing)
     left = tuple(study.departures(issued, loop, flight.recording) for issued in certified)
@@ -58,21 +59,21 @@ def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight, pointing: b
 
 
 def check_step(scenario: Scenario, loop: Any, flight: Flight, progress: Progress | None = None) -> Flight:
-    """Return the flight with the change of its metrics under half the integration step."""
+    """Return the flight with the changes of its metrics when the integration step is halved."""
     finer = record(scenario, halved(loop), progress)
     errors = step_error(flight.recording, finer, study_of(scenario.body).state_names(finer))
     return replace(flight, metrics=flight.metrics | {"step_error": errors})
 
 
 def record(scenario: Scenario, loop: Any, progress: Progress | None = None, process: str | None = None) -> Recording:
-    """The run of a loop, with the commands of a process if there is one."""
+    """Return the recorded run of a loop, with the commands of a process if one is given."""
     return _flown(scenario, loop, progress, process)[0]
 
 
 def _flown(
     scenario: Scenario, loop: Any, progress: Progress | None = None, process: str | None = None
 ) -> tuple[Recording, Any]:
-    """Fly a loop, with the commands of a process if there is one; return the run and its final carry."""
+    """Return the recorded run of a loop and its final carry, with the commands of a process if one is given."""
     timing = scenario.table.simulation
     if process is None:
         samples, carry = fly(loop, timing.steps, timing.record_every, progress=progress)
@@ -92,14 +93,14 @@ def _flown(
 
 
 def commanded_by(process: str, run: Recording) -> Recording:
-    """Return the recording of a flight whose commands came from a process, which is named among its attributes in place of
-    the program of the law."""
+    """Return the recording of a flight commanded by a process; its attributes name the process instead of the law's
+    program."""
     attrs = {name: value for name, value in run.attrs.items() if name != "law_program"}
     return replace(run, attrs=attrs | {"law_process": process})
 
 
 def name_samples(scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Recording:
-    """Name the samples of `fly`; with the attributes the run can be measured and repeated."""
+    """Return the samples of `fly` as a recording, whose attributes suffice to measure and to repeat the run."""
     run = study_of(scenario.body).name_samples(scenario, loop, samples, carry)
     signed = {"scenario": scenario.text, "starhold_version": __version__}
     return replace(run, attrs={**signed, **run.attrs, "body": scenario.body})
@@ -111,12 +112,12 @@ def metrics_of(run: Recording) -> dict[str, Any]:
 
 
 def metric_set_of(run: Recording) -> MetricSet:
-    """Return how the metrics of a recorded run are shown."""
+    """Return the rules by which the metrics of a recorded run are shown."""
     return study_of(run.attrs["body"]).metric_set(run)
 
 
 def compare(scenario: Scenario, notice: Notice | None = None, pointing: bool = False) -> list[Flight]:
-    """Fly every law of the scenario, in the order of the file; pointing: as `prove` has it."""
+    """Return the flights of all laws of the scenario, in the order of the file; pointing: as in `prove`."""
     loops = [(entry, build(scenario, entry)) for entry in scenario.laws]
     return [
         timed(scenario, loop, prove(scenario, entry, loop, fly_law(scenario, entry, loop, notice), pointing))
@@ -125,7 +126,7 @@ def compare(scenario: Scenario, notice: Notice | None = None, pointing: bool = F
 
 
 def _law_counters(entry: Any, memory: Any) -> dict[str, Any]:
-    """Return the counts of an iterative law during the run: solver iterations and the calls that used up their budget."""
+    """Return the counts of an iterative law in a run: solver iterations, and calls that reached the iteration limit."""
     counted = entry.law.counters(memory)
     if counted is None:
         return {}
@@ -145,9 +146,9 @@ def halved(loop: ClosedLoop) -> ClosedLoop:
 
 
 def step_error(run: Recording, finer: Recording, names: Iterable[str]) -> dict[str, float | None]:
-    """Return the largest differences of some quantities between a run and that of the `halved` loop: for quaternions the
-    angle between them (rad), else norms in the units of the recording. All are None if one of the two diverged before the
-    other, because then there is nothing to compare."""
+    """Return the largest differences of some quantities between a run and that of the `halved` loop: the angle (rad) between
+    quaternions, else norms in recorded units. All are None if one of the two diverged before the other, because then they
+    cannot be compared."""
     same = len(run["time"]) == len(finer["time"])
     return {name: _difference(run, finer, name) if same else None for name in names}
 

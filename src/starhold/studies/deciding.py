@@ -1,4 +1,4 @@
-"""Verdicts on requirements by proofs, by the margins of the linear loop and by the pointing budget."""
+"""Verdicts on requirements from proofs, margins of the linear loop and the pointing budget."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ BOUNDS: Mapping[str, tuple[str, str, str]] = {
     "peak_torque": ("N m", "torque-limit", "limit"),
     "peak_wheel_momentum": ("N m s", "wheels", "wheel_momentum"),
 }
-"""The metrics that claims bound from above: unit, kind of the claim, and the claim's number."""
+"""The metrics that claims bound from above, each with its unit, the kind of claim, and the name of the claim's number."""
 IDEAL = {
     "continuous-torque": "the zero-order hold of the torque",
     UNLIMITED: "the limit of the torque",
@@ -52,7 +52,7 @@ IDEAL = {
     FRICTIONLESS: "the friction of the wheels",
     "settled-estimate": "the time until the estimate has settled",
 }
-"""A claim leaves these out besides parts, by its assumptions."""
+"""What a claim leaves out besides parts, by its assumption."""
 MARGINS = {
     "gain_margin": "gain",
     "lower_gain_margin": "less",
@@ -61,12 +61,12 @@ MARGINS = {
     "crossover": "crossover",
     "sensitivity": "sensitivity",
 }
-"""The metrics of the linear loop, each for the worst of the three axes, with their names among one axis' margins."""
+"""The metrics of the linear loop, each for the worst of three axes, with their names among the margins of an axis."""
 OF_MARGINS = dict(zip(MARGINS, ("1", "1", "rad", "s", "rad/s", "1"), strict=True))
 
 
 def refuse_other_bodies(scenario: Scenario) -> None:
-    """Raise InputError where a requirement names a method that the scenario's body does not have."""
+    """Raise InputError where a requirement names a method that is not available for the scenario's body."""
     for method in ("proof", "budget", "margin"):
         for key in tables_of(scenario, method) if scenario.body != "rigid-body" else ():
             raise InputError(scenario.where, f"{key}.method", show(method), "flight, campaign or inspection, for this body")
@@ -76,8 +76,8 @@ def refuse_other_bodies(scenario: Scenario) -> None:
 
 
 def check_proofs(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]:
-    """Return the requirements that claims decide. InputError for a metric that none bounds from above, and for modes and
-    times."""
+    """Return the requirements that claims decide. InputError for a metric that no claim bounds from above, and for invalid
+    modes and times."""
     tables = tables_of(scenario, "proof")
     check_modes(scenario, entry, tables)
     for key, table in tables.items():
@@ -87,13 +87,13 @@ def check_proofs(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]
 
 
 def by_proof(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, issued: Sequence[Issued] | str) -> Verdicts:
-    """Return the verdicts by the claims about a law's loop: met, or not decided, because a requirement may hold without
-    proof. A text in place of claims says why there are none."""
+    """Return the verdicts from the claims about a law's loop: met, or not decided, because a requirement may hold without a
+    proof. issued: the certificates, or the reason why there are none."""
     tables = tables_of(scenario, "proof")
     if isinstance(issued, str):
         return {key: undecided(table, issued) for key, table in tables.items()}
     required = check_proofs(scenario, entry)
-    # Later loops have certificates of their own, which begin at states that this flight does not reach.
+    # Later loops have their own certificates, which begin at states that this flight does not reach.
     begun = [one for one in issued if one.step == 0 and one.before is None]
     changes = [f"what changes at {event.step * loop.period:g} s" for event in loop.events][:1]
     return {
@@ -111,8 +111,8 @@ def _proved(
     issued: Sequence[Issued],
     changes: Sequence[str],
 ) -> RequirementVerdict:
-    """Return the verdict of the claim that leaves out the least and keeps the limit, else that of the least bound, else why
-    there is none."""
+    """Return the verdict from the claim that meets the limit and leaves out the least, else from the smallest bound, else
+    the reason why there is none."""
     _, kind, name = BOUNDS[required.metric]
     modes, place = mode_names(entry), None
     if modes and table.in_mode is None:
@@ -129,7 +129,7 @@ def _proved(
             continue
         why = _late(scenario, key, table, claim) if kind == POINTING else ""
         times = times_of(scenario, key, table)
-        # Without an end a requirement is about the flight, and about a time after it where it begins there.
+        # A requirement without an end covers the flight, or the time after it where it begins there.
         until = times.end if math.isfinite(times.end) else max(scenario.table.simulation.duration, times.begin)
         grown = _grown(one, claim, until)
         unloaded = bool(grown) and any(_unloads(fitted.part) for fitted in one.loop.used("effector"))
@@ -159,18 +159,18 @@ def _proved(
 
 
 def _open(table: RequirementTable, required: Requirement, verdict: RequirementVerdict) -> RequirementVerdict:
-    """Return the verdict of a bound beyond the limit, which decides nothing about the number itself."""
+    """Return the verdict "not decided" for a bound beyond the limit, which does not decide about the number itself."""
     return undecided(table, f"only this bound is {verdict.evidence}", number=verdict.number, **limits(table, required))
 
 
 def _unloads(part: Any) -> bool:
-    """Return whether an effector turns a torque from outside against the wheels' momentum, and does not take the command."""
+    """Return whether an effector unloads the wheels by an external torque and does not take the command."""
     return part.flag("OUTSIDE") and not part.flag("ACTS") and "wheels" in part.needs
 
 
 def _grown(one: Issued, claim: Claim, until: float) -> str:
-    """Say how far torques from outside may take the momentum of body and wheels beyond what a claim assumes by a time (s),
-    and return an empty text where they do not."""
+    """Return a clause with the momentum of body and wheels that external torques may accumulate by a time (s), if it exceeds
+    the claim's assumption; else ""."""
     if "bounded-momentum" not in claim.assumptions:
         return ""
     n, subject = claim.numbers, one.certificate.subject
@@ -183,14 +183,14 @@ def _grown(one: Issued, claim: Claim, until: float) -> str:
         return ""
     said = f"of up to {most:.3g} N m s by {until:g} s" if math.isfinite(most) else "without a bound"
     return (
-        f"torques from outside may gather a total momentum {said}, and the claim assumes {n['momentum']:.3g} N m s: "
-        "momentum in [certify] states more"
+        f"external torques may accumulate a total momentum {said}, but the claim assumes {n['momentum']:.3g} N m s: "
+        "set a larger momentum in [certify]"
     )
 
 
 def _late(scenario: Scenario, key: str, table: RequirementTable, claim: Claim) -> str:
-    """Say why a claim of an ultimate bound does not cover the time, or the tolerances, of a requirement; empty where it
-    does."""
+    """Return the reason why a claim of an ultimate bound does not cover the time or the tolerances of a requirement; ""
+    where it does."""
     settling, tolerances = claim.numbers["settling"], scenario.table.settling
     if table.metric == "settling_time":
         ends = claim.numbers["angle"] <= tolerances.attitude_tolerance and claim.numbers["rate"] <= tolerances.rate_tolerance
@@ -198,13 +198,13 @@ def _late(scenario: Scenario, key: str, table: RequirementTable, claim: Claim) -
     if str(table.metric).startswith("final") and table.in_mode is not None:
         return "the last quarter of a mode is not known beforehand; use a peak after some time"
     begin = _begin(scenario, key, table)
-    # Of the angle there is a bound at all times.
+    # The angle has a bound at all times.
     covered = settling <= begin or BOUNDS[str(table.metric)][2] == "angle"
     return "" if covered else f"the ultimate bound is proved after {settling:.6g} s, not by {begin:g} s"
 
 
 def _begin(scenario: Scenario, key: str, table: RequirementTable) -> float:
-    """Return the time (s) from which a requirement is about the flight."""
+    """Return the time (s) from which a requirement applies."""
     begin = times_of(scenario, key, table).begin
     late = str(table.metric).startswith("final")
     return begin + 0.75 * (scenario.table.simulation.duration - begin) * late
@@ -219,7 +219,7 @@ def check_margins(scenario: Scenario) -> tuple[Requirement, ...]:
 
 
 def by_margins(scenario: Scenario, linear: Linear | str) -> Verdicts:
-    """Return the verdicts by the margins of a linear loop, each for the worst axis. A text in place of the loop says why
+    """Return the verdicts from the margins of a linear loop, each for the worst axis. linear: the loop, or the reason why
     there is none."""
     tables, required = tables_of(scenario, "margin"), check_margins(scenario)
     pairs = list(zip(tables.items(), required, strict=True))
@@ -240,8 +240,8 @@ def by_margins(scenario: Scenario, linear: Linear | str) -> Verdicts:
 
 
 def by_budget(scenario: Scenario, budget: Budget | str) -> Verdicts:
-    """Return the verdicts by a pointing budget: the level of all sources together. A text in place of it says why there is
-    none."""
+    """Return the verdicts from a pointing budget, by the level of all sources together. budget: the budget, or the reason
+    why there is none."""
     tables = tables_of(scenario, "budget")
     units = {f"{table.metric}": "rad" for table in tables.values()}
     pairs: Any = zip(tables.items(), at_most(scenario, tables, units), strict=True)

@@ -1,4 +1,4 @@
-"""A scenario as a Gymnasium environment: the observation is what flight software reads, the action its command."""
+"""A scenario as a Gymnasium environment: observations are the readings of flight software, actions its commands."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Reward = Callable[[Readings, Array], Any]
-"""The reward of a control period from the readings at its end and the command, (3,) or (lanes, 3), in the body's unit."""
+"""The reward of a control period, from the readings at its end and the command (3,) or (lanes, 3), in the body's unit."""
 
 
 def error_angle(readings: Readings, command: Array) -> Any:
     """Return minus the angle to the target (rad), as measured or estimated."""
-    # Noise in its parts may make a quaternion longer than 1.
+    # Noise in its components may make a quaternion longer than 1.
     return -2.0 * np.arccos(np.minimum(np.abs(readings.measurement.attitude[0]), 1.0))
 
 
 class _Plant:
-    """Flights of a scenario of its duration, and their observation and action spaces."""
+    """Flights of a scenario over its duration, and their observation and action spaces."""
 
     def __init__(self, scenario: Scenario, law: str | None, reward: Reward | None, lanes: int | None) -> None:
         loop = studies.build(scenario, scenario.pick(law))
@@ -47,7 +47,7 @@ class _Plant:
         self.observations = Box(-math.inf, math.inf, (self.flight.size,), np.float64)
 
     def begin(self, generator: np.random.Generator) -> tuple[Array, dict[str, Any]]:
-        """Return the first observation of flights with other random numbers."""
+        """Return the first observation of new flights with other random numbers, and further information."""
         return self.flight.reset(seed=int(generator.integers(1 << 31))).numbers.T, {}
 
     def fly(self, action: Any) -> tuple[Array, Any, Any, bool, dict[str, Any]]:
@@ -60,7 +60,7 @@ class _Plant:
 
 
 class Environment(gymnasium.Env[Array, Array]):
-    """One flight. It is terminated where its motion diverges and truncated after the scenario's duration."""
+    """One flight; terminated where its motion diverges, truncated at the end of the scenario's duration."""
 
     def __init__(self, scenario: Scenario, law: str | None = None, reward: Reward | None = None) -> None:
         self._plant = _Plant(scenario, law, reward, None)
@@ -68,22 +68,22 @@ class Environment(gymnasium.Env[Array, Array]):
 
     @property
     def flight(self) -> Stepper:
-        """The flight itself, with the true state."""
+        """The stepper of the flight, with the true state."""
         return self._plant.flight
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Begin a flight whose noise the seed draws."""
+        """Begin a flight with random numbers from the seed; return the observation and further information."""
         super().reset(seed=seed)
         return self._plant.begin(self.np_random)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Fly one control period under a command."""
+        """Fly one control period with a command; return observation, reward, terminated, truncated, information."""
         seen, reward, diverged, ended, more = self._plant.fly(action)
         return seen, float(reward), bool(diverged), ended, more
 
 
 class Environments(VectorEnv[Array, Array, Any]):
-    """A batch of flights that begin and end together: none restarts by itself."""
+    """A batch of flights that begin and end together; none restarts automatically."""
 
     def __init__(self, scenario: Scenario, lanes: int, law: str | None = None, reward: Reward | None = None) -> None:
         self._plant, self.num_envs = _Plant(scenario, law, reward, lanes), lanes
@@ -93,7 +93,7 @@ class Environments(VectorEnv[Array, Array, Any]):
         self.observation_space = batch_space(self.single_observation_space, lanes)
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Begin all flights, whose noise the seed draws."""
+        """Begin all flights with random numbers from the seed."""
         super().reset(seed=seed)
         return self._plant.begin(self.np_random)
 

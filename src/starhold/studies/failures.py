@@ -1,4 +1,4 @@
-"""Wheel failures: the control that a spacecraft has left after the loss of one or two wheels."""
+"""Wheel failures: the control authority that a spacecraft retains after the loss of one or two wheels."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from starhold.synthesis.stability_degree import degree, scale
 Array: TypeAlias = NDArray[np.float64]
 
 FULL = 0.99
-"""Share of its momentum limit at which a wheel counts as saturated: beyond it the motor loses its outward torque."""
+"""Share of its momentum limit at which a wheel counts as saturated: beyond it the motor cannot accelerate it further."""
 HORIZON = 1000
-"""The most orbits over which growth is extrapolated; slower growth counts as none."""
+"""The most orbits over which growth of momentum is extrapolated; slower growth counts as none."""
 WEAK = 1e-3
 """Singular values of the axes below this share of the largest mark directions without authority."""
 SINGULAR = 1e-9
@@ -43,8 +43,8 @@ MOST_STEPS = 2_000_000
 
 @dataclass(frozen=True)
 class Saturation:
-    """When the first wheel reaches its momentum limit: the time (s) and which wheel (from 1), both None where none does; how
-    that is known ("flown", "extrapolated", "none"); and the window (s) of its growth (None where flown)."""
+    """The first saturation of a wheel: its time (s) and the wheel's number from 1, both None where none saturates; how it is
+    known ("flown", "extrapolated", "none"); and the window (s) over which growth was measured (None where flown)."""
 
     time: float | None
     wheel: int | None
@@ -54,15 +54,15 @@ class Saturation:
 
 @dataclass(frozen=True)
 class Failure:
-    """A loss of wheels, and the control left after it. Values that need three axes are None where fewer are left. lost:
-    wheels, counted from 1, none for the intact set. lacking: body directions without authority, orthonormal (n, 3).
-    condition: condition number of the working axes. authority: N m. share: of the intact authority. gains: those that fly,
-    by field. eta: degree of stability (1/s), intact and after; None for a law not designed for one. settling: s, None where
-    it does not settle within the scenario's duration. diverged_at: s, None where the motion did not diverge. certified: the
-    largest slew from rest (rad), and the largest rate on target (rad/s), for which it is proved that no motor and no wheel
-    reaches its limit on the way to the target; None where that is not proved. momentum_share: largest |h| over its limit
-    among working wheels during the flight. flown: length of the flight (s). orbit: its period (s), None without one.
-    refused: why the law cannot fly with the wheels left; then there is no flight.
+    """A loss of wheels, and the control authority after it. Values that need three axes are None where fewer are left. lost:
+    the lost wheels, counted from 1; empty for the intact set. lacking: body directions without authority, orthonormal
+    (n, 3). condition: condition number of the working axes. authority: N m. share: authority relative to the intact set.
+    gains: those that fly, by field. eta: degree of stability (1/s), intact and after the loss; None for a law not designed
+    for one. settling: s, None where the motion does not settle within the scenario's duration. diverged_at: s, None where
+    the motion does not diverge. certified: the largest slew from rest (rad) and the largest rate on target (rad/s) for which
+    it is proved that no motor and no wheel reaches its limit; None where this is not proved. momentum_share: largest |h|
+    over its limit among working wheels during the flight. flown: length of the flight (s). orbit: orbital period (s), None
+    without an orbit. refused: why the law cannot fly with the remaining wheels; then there is no flight.
     """
 
     lost: tuple[int, ...]
@@ -86,7 +86,7 @@ class Failure:
 
     @property
     def name(self) -> str:
-        """The names of the lost wheels."""
+        """The name of the case, from the lost wheels."""
         return " and ".join(map(str, self.lost)) or "none"
 
     @property
@@ -101,11 +101,11 @@ def study(
     notice: Callable[[int, int, str], None] = lambda done, total, name: None,
     proof: bool = False,
 ) -> list[Failure]:
-    """Fly the intact set, then every single and every double loss, with a law of the scenario and without the scenario's
-    faults. The loss occurs at time 0 and is known at once: the torque is allocated to the wheels left and, where the law was
-    designed for a degree of stability, its gains are designed for the torque left. `notice` is called with the number done,
-    the total, and the next loss. proof: also prove how near to the target each loop stays. InputError where the scenario has
-    no wheels.
+    """Fly the intact set and every single and double loss of wheels, with one law and without the scenario's faults; return
+    all cases. The loss occurs at time 0 and is known at once: the torque is reallocated to the remaining wheels, and gains
+    designed for a degree of stability are redesigned for the remaining torque. `notice` is called with the number done, the
+    total, and the next loss. proof: whether to prove a pointing bound for each loop. InputError where the scenario has no
+    wheels.
     """
     wheels = require_wheels(scenario)
     count = len(wheels.axes)
@@ -123,7 +123,7 @@ def study(
 
 
 def directions_lacking(axes: Array) -> Array:
-    """Return orthonormal body directions (n, 3) about which wheels with these axes (k, 3) give almost no torque."""
+    """Return orthonormal body directions (n, 3) about which wheels with these axes (k, 3) have almost no authority."""
     if len(axes) == 0:
         return np.eye(3)
     directions, sizes, _ = np.linalg.svd(axes.T)
@@ -134,7 +134,7 @@ def directions_lacking(axes: Array) -> Array:
 
 
 def pick(scenario: Scenario, law: str | None) -> LawEntry:
-    """Return the law of this name, the first if None; InputError where the scenario has no wheels."""
+    """Return the law of this name, by default the first. InputError where the scenario has no wheels."""
     entry = scenario.pick(law)
     require_wheels(scenario)
     return entry
@@ -149,7 +149,7 @@ def require_wheels(scenario: Scenario) -> Wheels:
 
 
 def _left(wheels: Wheels, lost: tuple[int, ...], intact: float) -> Failure:
-    """Return the wheels left, with the same checks as for a diagnosed fault."""
+    """Return the case of these lost wheels before its flight, with the checks of a diagnosed fault."""
     limits = tuple(0.0 if i in lost else limit for i, limit in enumerate(wheels.torque_limit, 1))
     axes = np.array([axis for i, axis in enumerate(wheels.axes, 1) if i not in lost])
     try:
@@ -199,7 +199,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
     every, steps = table.simulation.record_every, _steps(scenario, loop, period)
     samples, carry = fly(loop, steps, every)
     recording = label(loop, samples, carry, every)
-    # A motion that diverges later has diverged all the same.
+    # A motion that diverges after the scenario's duration counts as diverged too.
     whole, settling = recording.until(table.simulation.duration), table.settling
     metrics = measure(whole, settling.attitude_tolerance, settling.rate_tolerance)
     working = [i for i in range(len(require_wheels(scenario).axes)) if i + 1 not in failure.lost]
@@ -224,7 +224,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
 
 
 def _after(loop: ClosedLoop) -> ClosedLoop:
-    """Return the loop that flies after the loss, known to its law."""
+    """Return the loop after the loss, which its law knows."""
     if not loop.events:
         return loop
     last = loop.events[-1]
@@ -243,8 +243,8 @@ def _certified(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> tuple[f
 
 
 def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
-    """Return the control steps to fly: an orbit more than the scenario where possible, because the wheels' momentum
-    oscillates with the orbit, and over less than one orbit this looks like growth."""
+    """Return the number of control steps to fly: one orbit more than the scenario if possible, because the wheels' momentum
+    oscillates with the orbit, which looks like growth over less than one orbit."""
     steps = scenario.table.simulation.steps
     if period is None or loop.target.part.name == "history" or loop.remembers:
         return steps
@@ -254,9 +254,9 @@ def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
 
 
 def saturation(times: Array, filled: Array, period: float | None) -> Saturation:
-    """Return when the first wheel saturates, from times (n,) (s), momenta over their limits (n, wheels) and the orbit period
-    (s). Growth over the last orbit, or the last half of the flight where that is shorter or there is no orbit, is added to
-    the largest momentum of its sign in that time, which is accurate to within an orbit. Wheels in the result count from 1.
+    """Return the first saturation, from times (n,; s), momenta relative to their limits (n, wheels) and the orbital period
+    (s). The growth over the last orbit (or the last half of the flight, if shorter or without an orbit) is extrapolated from
+    the largest momentum of the same sign in this window; the time is accurate to within an orbit.
     """
     beyond = np.argwhere(np.abs(filled) > FULL)
     if len(beyond):

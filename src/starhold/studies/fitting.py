@@ -1,7 +1,7 @@
-"""The readings that a scenario predicts under other values of some of its numbers, with their exact slopes.
+"""The readings that a scenario predicts for other values of some of its numbers, with their exact partial derivatives.
 
-The loop flies without noise, as recorded and compiled equations, from a start that is free too; slopes come from the
-derivative of the same program. What a number of the file does to the loop's numbers is an equation as well, and part of it.
+The loop flies without noise, as recorded and compiled equations, from an initial state that is free too; slopes are computed
+by differentiating the same program. The equations from numbers of the file to numbers of the loop are part of it.
 """
 
 from __future__ import annotations
@@ -32,16 +32,18 @@ from starhold.trace.tangent import MARK, tangent
 Array: TypeAlias = NDArray[np.float64]
 Nodes: TypeAlias = Callable[[int, Array], Array]
 START = tuple(f"{name}_{axis}" for name in ("initial turn", "initial rate") for axis in "xyz")
-"""The start is always estimated: a rotation vector (rad) that corrects the attitude, in body axes, and the rate (rad/s)."""
+"""Components of the initial state, always estimated: a rotation vector (rad, body axes) that corrects the attitude, and the
+rate (rad/s)."""
 WIDTH = 16
-"""Slopes that are computed at once."""
+"""The number of slopes computed at once."""
 NUDGE = 1e-6
-"""Products of inertia that are 0 and free have this share of the largest moment where a loop is made for them."""
+"""The share of the largest moment of inertia that replaces free products of inertia of 0, to get a loop with their
+structure."""
 
 
 class Reading(NamedTuple):
-    """A vector that a sensor reads: its name in recordings, where its numbers stand in a row of predictions, and the names
-    and places of the numbers that tell whether it is a new one or sees anything."""
+    """A sensor's vector reading: its name in recordings, its first column and size in a row of predictions, and the names
+    and columns of the flags that tell whether it is new or valid."""
 
     name: str
     first: int
@@ -50,13 +52,13 @@ class Reading(NamedTuple):
 
     @property
     def rows(self) -> slice:
-        """Where its numbers stand."""
+        """The columns of its components."""
         return slice(self.first, self.first + self.size)
 
 
 @dataclass(frozen=True)
 class Free:
-    """The free numbers of a scenario: the places of the keys, the name of each number, and its value there."""
+    """The free numbers of a scenario: the places of their keys, the name of each number, and its value in the file."""
 
     places: tuple[Place, ...]
     names: tuple[str, ...]
@@ -64,7 +66,7 @@ class Free:
 
     @classmethod
     def of(cls, scenario: Scenario, keys: Sequence[str]) -> Free:
-        """InputError for what is no key with a number that an equation follows."""
+        """Return the free numbers of these keys. InputError for a key that cannot be fitted."""
         located: list[Place] = []
         names, values = list[str](), list[float]()
         for key in keys:
@@ -73,13 +75,13 @@ class Free:
             except InputError as error:
                 raise _refused(scenario, key, error.given, error.allowed) from None
             if place.wordy or place.whole:
-                raise _refused(scenario, key, "no real number", "keys of real numbers, for only those have slopes")
+                raise _refused(scenario, key, "not a real number", "keys of real numbers, because only those have slopes")
             if place.key.startswith("initial."):
                 raise _refused(
-                    scenario, key, "the start", "other keys, for attitude and rate at the start are always fitted"
+                    scenario, key, "the start", "other keys, because attitude and rate at the start are always fitted"
                 )
             if place.value is None or not np.isfinite(place.value).all():
-                raise _refused(scenario, key, "no finite value", "a key with a value in the file, to begin with")
+                raise _refused(scenario, key, "no finite value", "a key with an initial value in the file")
             if any(place.path[: len(other.path)] == other.path[: len(place.path)] for other in located):
                 raise _refused(scenario, key, "a number given twice", "each number once")
             index = components(place.shape, is_symmetric(place))
@@ -96,8 +98,8 @@ class Free:
 
     @cached_property
     def sizes(self) -> Array:
-        """The size of each number: the largest that its key has; of a key that is 0 the bound nearest to that, or 1 of one
-        without a unit; else 0, for none is known."""
+        """The typical size of each number: the largest magnitude in its key; for a key that is 0 the bound nearest to 0, or
+        1 if dimensionless; else 0, which means unknown."""
         every: list[float] = []
         for place in self.places:
             ends = [abs(end) for end in (place.bounds.at_least, place.bounds.at_most) if end]
@@ -108,7 +110,7 @@ class Free:
         return np.array(every)
 
     def shaped(self, numbers: Sequence[Any]) -> list[Any]:
-        """The numbers in the shape of each key."""
+        """Return the numbers grouped by key, in the shape of each key."""
         given, shaped = iter(numbers), list[Any]()
         for place in self.places:
             index = components(place.shape, is_symmetric(place))
@@ -128,8 +130,8 @@ def _refused(scenario: Scenario, key: str, given: str, allowed: str) -> InputErr
 
 
 class Prediction(NamedTuple):
-    """Readings (instants, numbers) and their slopes (instants, numbers, free + 1); the last slope is toward a flight without
-    gaps at its nodes. starts: what each segment began with after the first, (nodes, 7), with slopes in the same way."""
+    """Readings (instants, numbers) and their slopes (instants, numbers, free + 1); the last slope is along the closing of
+    the gaps between segments. starts: the initial states of the segments after the first, (nodes, 7), and their slopes."""
 
     values: Array
     slopes: Array
@@ -138,15 +140,15 @@ class Prediction(NamedTuple):
 
 
 class Predictor:
-    """Predicts the readings of a loop as a function of its start and of free numbers of its file."""
+    """Predicts the readings of a loop as a function of its initial state and of free numbers of its file."""
 
     def __init__(self, scenario: Scenario, entry: LawEntry, free: Free, outside: bool) -> None:
-        """outside: whether commands come from outside; else the scenario's law flies with its estimator."""
+        """outside: whether commands are given; else the scenario's law flies with its estimator."""
         self.scenario, self.free, self.outside = scenario, free, outside
         loop = build(_nudged(scenario, free), entry)
         loop = loop.without("estimator") if outside else loop
         if loop.events:
-            raise InputError(scenario.where, "fault", "changes during the flight", "a scenario without, to be fitted")
+            raise InputError(scenario.where, "fault", "changes during the flight", "a scenario without faults, for a fit")
         self.loop, self.count = loop, len(START) + len(free.names)
         parts = loop.composition()
         self._like = loop.carry()
@@ -159,7 +161,7 @@ class Predictor:
             raise _refused(scenario, ", ".join(place.key for place in free.places), given, allowed) from None
         varied = ("carry", "free", "record")
         self.programs: tuple[Program, Program] = (programs[0], programs[1])
-        """What makes the carry, and what flies, without slopes."""
+        """The programs that make the carry and that fly, without slopes."""
         self._begin, self._fly = (Kernel(tangent(program, varied), WIDTH) for program in self.programs)
         self.constant = {"shared": arguments.shared, "tables": arguments.tables, "own": arguments.shared}
         self.readings, self.row = _readings(loop)
@@ -167,7 +169,7 @@ class Predictor:
         self._moving = [*state.attitude, *state.rate]
 
     def _made(self, numbers: Sequence[Any]) -> tuple[Any, Numbers]:
-        """The carry and the numbers of a kernel: an equation."""
+        """Return, by an equation, the carry and the numbers of the kernel."""
         hooks, loop, true, params = self.scenario.hooks, self.loop, dict[str, Any](), dict[str, Any]()
         dials = hooks.dials(self.scenario)
         for place, value in zip(self.free.places, self.free.shaped(numbers[len(START) : self.count]), strict=True):
@@ -177,7 +179,7 @@ class Predictor:
                 continue
             key = ".".join(map(str, place.path[:2]))
             if key not in dials:
-                raise ValueError(f"no equation follows {place.key}")
+                raise ValueError(f"no equation gives the effect of {place.key}")
             true[key] = put(true.get(key, dials[key]), place.path[2:], value)
         moved = hooks.flown(self.scenario, loop, true, {})
         parts = tuple(replace(one, params=params[one.name]) if one.name in params else one for one in moved.parts)
@@ -187,22 +189,22 @@ class Predictor:
         return loop.carry(state, setup=setup), Numbers(loop.gains, moved.nominal, moved.craft, setup)
 
     def begun(self, attitude: Any, rate: Any) -> Array:
-        """The numbers of a flight from this attitude and rate under those of the file: turn, rate, the free numbers of the
-        file, and after them, which have no slopes, the attitude that the turn begins from."""
+        """Return the parameters x (free + 4,) of a flight from this attitude and rate with the file's numbers: turn, rate,
+        the free numbers, and the attitude to which the turn applies, which has no slopes."""
         return np.array([0.0, 0.0, 0.0, *rate, *self.free.values, *attitude])
 
     def moved(self, x: Array, step: Array) -> Array:
-        """The numbers after a step (free,), in which the turn is 0 again."""
+        """Return the parameters x (free + 4,) after a step (free,), with the turn moved into the attitude."""
         x = x + np.pad(step, (0, 4))
         return np.concatenate([np.zeros(3), x[3 : self.count], _turned(x.tolist())])
 
     def __call__(
         self, x: Array, steps: int, commands: Array, cuts: Sequence[int] = (), nodes: Nodes | None = None
     ) -> Prediction:
-        """Fly for `steps` control steps and one more, which shows the last readings.
+        """Return the prediction for `steps` control steps and one more, which gives the last readings.
 
-        x: (free + 4,), see `begun`; commands: (steps + 1, 3) N m; cuts: the steps at which `nodes` gives what the next
-        segment begins with, attitude and rate (7,), of its number and of what the last one ended with."""
+        x: (free + 4,), see `begun`; commands: (steps + 1, 3) N m; cuts: the steps at which a new segment begins, with the
+        attitude and rate (7,) that `nodes` returns for its number and the final state of the previous segment."""
         count, size, given = steps + 1, self.row, np.ascontiguousarray(commands)
         memories = [self._started(x, count * size, block) for block in range(-(-(self.count + 1) // WIDTH))]
         flights = [self._fly.on(self.constant | memory | {"given": given}) for memory in memories]
@@ -225,7 +227,7 @@ class Predictor:
         return Prediction(values, slopes[:, :, shown], starts, of_starts[:, :, shown])
 
     def _started(self, x: Array, size: int, block: int) -> dict[str, Array]:
-        """The memories with which a block of directions begins; size: of the record."""
+        """Return the initial memories for a block of slopes; size: that of the record."""
         numbers = np.array(numbers_of(self._like))
         sizes = {"carry": len(numbers), "free": len(x), "record": size}
         memory = {name + mark: aligned(rows, WIDTH) for name, rows in sizes.items() for mark in ("", MARK)}
@@ -237,12 +239,12 @@ class Predictor:
 
 
 def _turned(numbers: Sequence[Any]) -> Any:
-    """The attitude at the start: the last four numbers turned by the first three."""
+    """Return the initial attitude: the last four numbers, turned by the first three."""
     return normalise(multiply(tuple(numbers[-4:]), (1.0, *(0.5 * angle for angle in numbers[:3]))))
 
 
 def _nudged(scenario: Scenario, free: Free) -> Scenario:
-    """The scenario whose loop has the form of one with free products of inertia."""
+    """Return a scenario whose loop has the structure needed for free products of inertia."""
     changes = dict[str, Any]()
     for place in free.places:
         if len(place.shape) == 2 and place.path[0] != "part":
@@ -253,7 +255,7 @@ def _nudged(scenario: Scenario, free: Free) -> Scenario:
 
 
 def _readings(loop: ClosedLoop) -> tuple[tuple[Reading, ...], int]:
-    """The vectors that sensors read, and how many numbers all readings have."""
+    """Return the vector readings of the sensors, and the number of columns of all readings."""
     readings: list[Reading] = []
     setup, row = loop.setup(), 0
     carry = loop.carry()

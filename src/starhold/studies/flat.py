@@ -1,5 +1,5 @@
-"""All numbers of a loop, flattened into one row with names; and the test whether an equation gives them. Which keys of a
-file an equation follows is found by building scenarios with other values and comparing their numbers with those of the
+"""All numbers of a loop, flattened into one row with names, and the test whether an equation gives them. To decide for which
+keys of a file an equation is valid, scenarios with other values are built and their numbers compared with those of the
 equation, to the last bit.
 """
 
@@ -23,8 +23,8 @@ Array: TypeAlias = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Flat:
-    """A loop as a row of numbers. form: equal for loops that one kernel flies; names and numbers, in order: of the initial
-    carry, of each phase, and the times at which later phases begin."""
+    """A loop as a row of numbers. form: equal for loops that one kernel flies; names and numbers: those of the initial carry
+    and of each phase, then the times at which later phases begin."""
 
     loop: ClosedLoop
     form: Any
@@ -33,29 +33,29 @@ class Flat:
 
     @classmethod
     def of(cls, loop: ClosedLoop, steps: int, entered: bool = False) -> Flat:
-        """Return the numbers of a loop that flies `steps` control steps; `entered`: with the carry after the first phase has
-        begun, which may change it."""
+        """Return the numbers of a loop that flies `steps` control steps; `entered`: whether to take the carry after the
+        start of the first phase, which may change it."""
         phases = loop.phases(steps)
         carry = phases[0].entered(loop.carry()) if entered else loop.carry()
         numbers = named_numbers(loop, numbers_of(carry), phases)
         return cls(loop, kernel_key(Flying(loop, steps, 1)), tuple(numbers), np.array([*numbers.values()], dtype=float))
 
     def gives(self, other: Flat | None, numbers: Any) -> bool:
-        """Return whether this loop's kernel with these numbers flies another loop (None for an impossible one), to the last
-        bit."""
+        """Return whether these numbers are, to the last bit, those of the loop `other` (None for an impossible one), and
+        this loop's kernel flies it."""
         if other is None or other.form != self.form:
             return False
         given = np.ascontiguousarray(numbers, dtype=float)
         return other.numbers.shape == given.shape and other.numbers.tobytes() == given.tobytes()
 
     def places(self, name: str) -> list[int]:
-        """Return the indices of a number of this name, in every phase that has it."""
+        """Return the indices of the number of this name in all phases that have it."""
         return [place for place, full in enumerate(self.names) if full == name or full.endswith(f"].{name}")]
 
 
 def named_numbers(loop: ClosedLoop, carry: Sequence[Any], phases: Sequence[Phase]) -> dict[str, Any]:
-    """Yield the numbers of a loop, or arrays (lanes,) in their places, by name: of its carry, with the contents of its
-    buffers last; of phases, those of events by their number; then the times of events, in the body's unit of time."""
+    """Return the numbers of a loop, or arrays (lanes,) in their place, by name: those of its carry, with the contents of its
+    buffers last; those of phases, numbered by event; then the times of events, in the body's unit of time."""
     names = [name for name, _ in named(loop.carry(), "")]
     numbers = dict(zip([*names, *(f"buffer[{k}]" for k in range(1, len(carry) - len(names) + 1))], carry, strict=True))
     for number, phase in enumerate(phases):
@@ -80,7 +80,8 @@ _OF_ONE = re.compile(r"(memories|setup)\.(estimator|target)\b")
 
 
 def shown_name(loop: ClosedLoop, name: str) -> str:
-    """Return the name of a number in tables: its part first, with state and memory distinct from parameters."""
+    """Return the name of a number in tables, which begins with its part and distinguishes states and memories from
+    parameters."""
 
     def called(where: str | None, fitted: Any) -> str:
         return fitted.called + {"setup": "", "memories": ".memory"}.get(where or "", ".state")

@@ -1,4 +1,4 @@
-"""One flown law with all that reports need."""
+"""The flight of one law, with everything that reports need."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 class Begun(NamedTuple):
-    """A mode of this name begins at a time (s), on a date (UTC) where the law's conditions know of dates, because of the
-    monitor that is tripped then, if one is."""
+    """The beginning of a mode: its name, the time (s), the date (UTC) if the law's conditions use dates, and the monitor
+    whose trip caused it, if any."""
 
     mode: str
     time: float
@@ -37,8 +37,8 @@ class Begun(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Flight:
-    """One law's run of a scenario: the name the scenario gives the law, the law's type, the recording, its metrics, its
-    gains with their units, how metrics are shown and ranked, and its certificates."""
+    """One law's run of a scenario: the law's name in the scenario, its type, the recording, metrics, gains with units, the
+    rules by which metrics are shown and ranked, and certificates."""
 
     name: str
     law: str
@@ -47,16 +47,16 @@ class Flight:
     gains: Values
     metric_set: MetricSet
     certificates: tuple[Certificate, ...] = ()
-    """All that is proved of the law on this spacecraft, initially and after faults."""
+    """The certificates of the law on this spacecraft, initially and after faults."""
     departures: tuple[Mapping[str, tuple[Departure, ...]], ...] = ()
-    """The departures of this flight from the proved claims of each certificate, by their kinds."""
+    """The departures of this flight from the proved claims of each certificate, by kind of claim."""
     covered: tuple[tuple[tuple[float, float], ...], ...] = ()
-    """The times (s) between which the claim of each certificate about the loop as it flies covers this flight."""
+    """For each certificate, the intervals (s) in which its claim about the loop as it flies covers this flight."""
 
     modes: tuple[Begun, ...] = ()
     """The modes that flew, in order, for a law with modes."""
     never: tuple[str, ...] = ()
-    """Sentences about modes that could have begun, and did not."""
+    """Sentences about modes that could have begun but did not."""
 
     def __repr__(self) -> str:
         shown = self.metric_set
@@ -74,12 +74,12 @@ class Flight:
 
     @property
     def lost(self) -> float | None:
-        """When the motion diverged (s), None for a run that did not."""
+        """The time (s) at which the motion diverged, or None."""
         return self.metrics.get("diverged_at")
 
     @cached_property
     def unknown(self) -> dict[str, float]:
-        """Recorded quantities that are NaN from some time (s) to the end of a motion that does not diverge."""
+        """Recorded quantities that are NaN from some time on in a motion that does not diverge, with these times (s)."""
         run, times = self.recording, dict[str, float]()
         for name in run.columns if self.lost is None else ():
             values = np.asarray(run.arrays.get(name, 0.0))
@@ -89,13 +89,13 @@ class Flight:
         return times
 
     def left(self, certificate: int, kind: str) -> tuple[Departure, ...]:
-        """Return the departures of this flight from a claim of one of its certificates; empty where it keeps to it."""
+        """Return the departures of this flight from a claim of one of its certificates; empty where there are none."""
         return self.departures[certificate].get(kind, ()) if self.departures else ()
 
     def results(self) -> dict[str, Any]:
-        """Return the content of a summary: the metrics, when modes begin and, for a certified law, each claim with its
-        outcome, the time (s) from which it does not cover this flight (None: it covers all of it), and the reasons then and
-        later."""
+        """Return the content of a summary: the metrics, the times at which modes begin and, for a certified law, each claim
+        with its outcome, the time (s) from which it does not cover this flight (None: it covers all of it), and the
+        reasons."""
         claims: list[dict[str, Any]] = []
         for number, certificate in enumerate(self.certificates):
             for claim in certificate.claims:

@@ -1,4 +1,4 @@
-"""Results as tidy pandas tables: measured numbers in columns, their subjects in rows."""
+"""Results as tidy pandas tables, with one row per subject and one column per measured number."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def to_pandas(results: Any) -> DataFrame:
             rows.append({"name": item.name, "law": item.law, "form": item.form, **item.inputs, **item.gains})
         else:
             raise TypeError(
-                f"no table is made of {type(item).__name__}; give a run, flights, certificates, designs or margins"
+                f"cannot make a table of {type(item).__name__}; give a run, flights, certificates, designs or margins"
             )
     table = frame_of(rows)
     table.attrs["units"] = units
@@ -57,7 +57,7 @@ def to_pandas(results: Any) -> DataFrame:
 
 
 def run_frame(run: xr.Dataset) -> DataFrame:
-    """Return a run with a row for each sample: time, then every number, and every component in a column of its own, such as
+    """Return a run as a table with a row per sample and a column for time and for each number or component, such as
     rate_x."""
     import pandas as pd
 

@@ -1,8 +1,8 @@
-"""Numbers of a scenario fitted to telemetry: weighted least squares by Gauss-Newton steps over multiple shooting.
+"""Fits numbers of a scenario to telemetry, by weighted least squares with Gauss-Newton steps over multiple shooting.
 
-The flight is cut into segments that begin where readings tell the state, so that a wrong guess does not lead astray; the
-gaps between them close with the steps (H. G. Bock's condensing: the columns of the Jacobian fly through the nodes, with one
-more for the gaps). Weights are the noise that sensors state.
+The flight is divided into segments that begin where readings determine the state, so that a poor initial guess does no harm;
+the gaps between segments close as the iteration proceeds (H. G. Bock's condensing: the columns of the Jacobian are
+propagated through the nodes, with one more column for the gaps). Weights are the noise that sensors state.
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ from starhold.studies.telemetry import Telemetry, read
 
 COMMANDS = {
     "recorded": "The recorded commands act on the plant, each held until the next.",
-    "law": "The scenario's own law flies on noise-free readings: noise that moved the craft through the law is left out.",
+    "law": "The scenario's own law flies on noise-free readings; motion caused by noise through the law is neglected.",
     "none": "No command acts: the craft tumbles freely.",
 }
 SPAN, SEGMENTS = 0.5, 500
-"""The angle (rad) by which the craft turns in a segment of the flight, about, and the most segments."""
+"""The approximate angle (rad) by which the craft turns in a segment of the flight, and the most segments."""
 STEPS = 40
 NEAR = 2.0
-"""A reading is used for the state at an instant if it is fewer control periods away than this."""
+"""The distance in control periods below which a reading is used for the state at an instant."""
 TURN = 0.5
-"""The initial attitude turns by at most so much in a step (rad)."""
+"""The largest turn of the initial attitude in a step (rad)."""
 CLOSED = 1.0
-"""Gaps that change residuals by less than this, in deviations of their noise, are closed."""
+"""Gaps count as closed if they change residuals by less than this, in standard deviations of their noise."""
 SETTLED = 1e-6
-"""The sum of squares has settled once a step is to lower it by less."""
+"""The iteration has converged once the predicted decrease of the sum of squares is smaller than this."""
 RELAXED = 0.1
-"""With each step of the whole flight the damping falls to this share."""
+"""The factor by which each step over the whole flight reduces the damping."""
 HALVINGS = 12
 
 
 @dataclass(frozen=True)
 class Identified:
-    """A fit gives these. values: of the free numbers; start: attitude and rate (7,) at time 0; posterior: their covariance,
-    and what is undetermined; residuals: by reading times and residuals (n, size) in deviations; readings: the rows that were
-    read, and those of the fit; whiteness: by residual the p-value of Ljung and Box; chi2: the sum of squared residuals, with
-    its degrees of freedom; units: of the readings; notes: sentences about omissions."""
+    """The result of a fit. values: those of the free numbers; start: attitude and rate (7,) at time 0; posterior: their
+    covariance and the undetermined combinations; residuals: times and residuals (n, size) in standard deviations, by
+    reading; readings: the measured rows and the fitted ones; whiteness: the p-value of Ljung and Box, by residual; chi2: the
+    sum of squared residuals, with its degrees of freedom; units: those of the readings; notes: sentences about omissions."""
 
     scenario: Scenario
     free: Free
@@ -72,16 +72,16 @@ class Identified:
 
     @property
     def consistent(self) -> float:
-        """The probability of so large a sum of squares, were the noise as stated."""
+        """The probability of a sum of squares at least as large, if the noise is as stated."""
         return float(stats.chi2.sf(self.chi2, self.degrees))
 
     @property
     def white(self) -> bool:
-        """Whether no residual is correlated in time, at 1 % for all of them together."""
+        """Whether no residual is correlated in time, at a significance level of 1 % for all of them together."""
         return min(self.whiteness.values()) * len(self.whiteness) >= 0.01
 
     def summary(self) -> dict[str, Any]:
-        """All numbers of the fit, for summary.json."""
+        """Return all numbers of the fit, for summary.json."""
         posterior, names = self.posterior, self.free.names
         return {
             "estimates": dict(zip(names, self.values.tolist(), strict=True)),
@@ -98,12 +98,12 @@ class Identified:
         }
 
     def fitted(self) -> dict[str, Any]:
-        """The values by key, as a change of the scenario."""
+        """Return the fitted values by key, as a change of the scenario."""
         shaped = self.free.shaped(self.values.tolist())
         return {place.key: np.array(value).tolist() for place, value in zip(self.free.places, shaped, strict=True)}
 
     def learnt(self) -> Scenario:
-        """The scenario with the estimated numbers, and a campaign over their remaining uncertainty."""
+        """Return the scenario with the estimated numbers and a campaign over their remaining uncertainty."""
         changed = self.scenario.with_(self.fitted())
         return self.posterior.over(changed, self.free, self.values)
 
@@ -111,14 +111,14 @@ class Identified:
 def study(
     scenario: Scenario, entry: LawEntry, source: Any, mapping: Any = None, free: Any = None, commands: Any = None
 ) -> Identified:
-    """Fit the numbers at some keys, and the start, to the telemetry in a file, a folder of a run or a Dataset.
+    """Fit the numbers at some keys, and the initial state, to the telemetry in a file, a run's folder or a Dataset.
 
-    mapping: see `telemetry.read`; free: the keys, in a list or with commas between them; commands: "recorded", "law" or
-    "none", by default as recorded where they are, else the law's. InputError for keys that cannot be fitted, sensors that
-    the telemetry lacks or that state no noise, and fewer data than free numbers."""
+    mapping: see `telemetry.read`; free: the keys, as a list or separated by commas; commands: "recorded", "law" or "none",
+    by default the recorded ones if any, else the law's. Returns the result of the fit. InputError for keys that cannot be
+    fitted, sensors without telemetry or without stated noise, and fewer data than free numbers."""
     keys = [key.strip() for key in free.split(",")] if isinstance(free, str) else list(free or ())
     if not any(keys):
-        raise InputError(scenario.where, "--free", "nothing", 'keys with commas between them: "spacecraft.inertia"')
+        raise InputError(scenario.where, "--free", "nothing", 'keys separated by commas, such as "spacecraft.inertia"')
     telemetry = read(scenario, build(scenario, entry), source, mapping)
     kinds = [kind for kind in COMMANDS if kind != "recorded" or "command" in telemetry.columns]
     kind = kinds[0] if commands is None else commands
@@ -132,18 +132,18 @@ class Fit:
     """Telemetry with the predictor of a scenario. One predictor serves any number of flights."""
 
     def __init__(self, scenario: Scenario, predictor: Predictor, telemetry: Telemetry, kind: str = "recorded") -> None:
-        """kind: of the commands, see COMMANDS."""
+        """kind: the kind of commands, see COMMANDS."""
         self.scenario, self.predictor, self.telemetry, self.kind = scenario, predictor, telemetry, kind
         self.period = predictor.loop.period
         self.notes = tuple[str, ...]()
-        # Damping for a number to change by about the size of its key; none of the start and of keys that are 0.
+        # The damping lets a number change by about the size of its key; the start and keys that are 0 have none.
         sizes = np.concatenate([np.zeros(len(START)), predictor.free.sizes])
         self._damping = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
         times = telemetry.times
         if not len(times) or times[0] < 0.0:
             given = f"{telemetry.name} begins at {times[0]:g} s" if len(times) else f"{telemetry.name} is empty"
             raise InputError(scenario.where, "", given, "samples from the start of the scenario, time 0, on")
-        # Times that are instants of the loop but for rounding are read there.
+        # Times that differ from a control instant only by rounding are moved to it.
         places = times / self.period
         whole = np.round(places)
         places = np.where(np.abs(places - whole) < 1e-6, whole, places)
@@ -155,7 +155,7 @@ class Fit:
             raise InputError(scenario.where, "--free", f"{free} free numbers with the start", f"at most the {count} data")
 
     def _held(self, places: Array) -> Array:
-        """The command of each instant: the last recorded one, none before the first."""
+        """Return the command at each instant: the last recorded one, zero before the first."""
         commands = np.zeros((self.steps + 1, 3))
         given = self.telemetry.columns.get("command") if self.kind == "recorded" else None
         if given is not None:
@@ -174,25 +174,25 @@ class Fit:
             good &= columns[gate][:, 0] > 0.5 if gate in columns else True
         noise = noise_of(self.predictor.loop, reading)
         if noise is None:
-            allowed = "a sensor that states its noise, for readings are weighed by it"
+            allowed = "a sensor that states its noise, because readings are weighted by it"
             raise InputError(self.scenario.where, reading.name, "no noise", allowed)
         if noise.accumulates:
-            self.notes += (f"The noise that accumulates in {reading.name}, as a bias that walks, is left out.",)
+            self.notes += (f"Accumulating noise of {reading.name}, such as a bias random walk, is neglected.",)
         return Weighed.of(reading, columns[reading.name][good], places[good], self.steps, noise)
 
     def residuals(self, given: Prediction) -> tuple[Array, Array]:
-        """All residuals (n,) in deviations, and their slopes (n, free + 1)."""
+        """Return all residuals (n,) in standard deviations, and their slopes (n, free + 1)."""
         every = [one.residuals(given) for one in self.weighed]
         slopes = [by.reshape(-1, by.shape[-1]) for _, by in every]
         return np.concatenate([values.ravel() for values, _ in every]), np.concatenate(slopes)
 
     def _read(self, name: str) -> tuple[Array, Array]:
-        """Places among instants and rows of a reading of a part of the state, such as a gyro's; empty without one."""
+        """Return the instants and rows of a reading of a state component, such as the rate; empty without one."""
         those = [one for one in self.weighed if one.reading.name.endswith(f"_{name}") and len(one.rows)]
         return (those[0].times, those[0].rows) if those else (np.empty(0), np.empty(0))
 
     def _begun(self) -> tuple[Array, list[int], Nodes]:
-        """Where the search begins: free numbers, the cuts of the flight, and how its segments begin."""
+        """Return the initial guess: the parameters, the steps at which segments begin, and their initial states."""
         start, attitude, rate = self.predictor.loop.start, self._read("attitude"), self._read("rate")
         fastest = max(np.linalg.norm(rate[1].reshape(-1, 3), axis=1), default=0.0)
         length = max(1, -(-self.steps // SEGMENTS), int(SPAN / max(1e-9, fastest * self.period)))
@@ -223,11 +223,11 @@ class Fit:
         return float(values @ values) if np.isfinite(values).all() else np.inf
 
     def solved(self) -> Identified:
-        """Fit the free numbers."""
+        """Fit the free numbers and return the result."""
         return self.identified(*self.descended(self._closed(*self._begun())))
 
     def _closed(self, x: Array, cuts: Sequence[int], node: Nodes) -> Array:
-        """The free numbers once the gaps between segments have closed, or nearly."""
+        """Return the parameters once the gaps between segments are closed, or nearly so."""
         nodes = node
         for _ in range(STEPS if cuts else 0):
             given = self.predictor(x, self.steps, self.commands, cuts, nodes)
@@ -241,8 +241,8 @@ class Fit:
         return x
 
     def descended(self, x: Array) -> tuple[Array, Prediction, int, bool]:
-        """The free numbers with the least squares from some on, the flight there, the steps it took, and whether they have
-        settled."""
+        """Return the parameters of the least-squares solution reached from x, the flight there, the number of steps, and
+        whether the iteration has converged."""
         given, settled, number = self._whole(x), False, 0
         for number in range(1, STEPS + 1):
             values, slopes = self.residuals(given)
@@ -251,7 +251,7 @@ class Fit:
             if lowered < SETTLED and settled:
                 break
             if lowered < SETTLED:
-                # Once more, with undetermined combinations as near to the file's numbers as possible.
+                # Once more, with undetermined combinations as close to the file's numbers as possible.
                 settled, x = True, self._restored(x, slopes[:, :-1])
                 given = self._whole(x)
                 continue
@@ -267,12 +267,12 @@ class Fit:
         return x, given, number, settled
 
     def _step(self, values: Array, slopes: Array, relaxed: float) -> tuple[Array, float]:
-        """A Gauss-Newton step, (free,), and the part of it to go. It is damped, so that weakly observable directions do not
-        run away while residuals are large, and is 0 along unobservable ones."""
+        """Return a Gauss-Newton step (free,) and the fraction of it to take. The step is damped, so that weakly observable
+        directions do not run away while residuals are large, and is 0 along unobservable ones."""
         if not np.isfinite(slopes).all():
-            raise InputError(self.scenario.where, "", "", "the flight diverges under the numbers of the file")
+            raise InputError(self.scenario.where, "", "", "the flight diverges with the numbers of the file")
         damping = self._damping * relaxed * np.sqrt(values @ values / len(values))
-        # As few rows as there are numbers have the same squares.
+        # Reduced to as many rows as there are numbers, with the same sum of squares.
         few: Any = np.linalg.qr(np.column_stack([slopes[:, :-1], values]), mode="r")
         rows = np.vstack([few[:, :-1], np.diag(damping)])
         sizes = np.linalg.norm(rows, axis=0)
@@ -281,7 +281,7 @@ class Fit:
         return step, min(1.0, TURN / max(1e-300, float(np.abs(step[:3]).max())))
 
     def _restored(self, x: Array, slopes: Array) -> Array:
-        """The free numbers moved along what readings do not tell, to be as near to the file's as can be."""
+        """Return the parameters moved along unobservable directions to be as close as possible to the file's numbers."""
         free, now = self.predictor.free, x[len(START) : -4]
         sizes = np.where(free.sizes > 0.0, free.sizes, 1.0)
         undetermined, off = posterior_of(slopes, free, now).undetermined / sizes, (now - free.values) / sizes
@@ -292,7 +292,7 @@ class Fit:
         return self.predictor(x, self.steps, self.commands)
 
     def identified(self, x: Array, given: Prediction, number: int, settled: bool) -> Identified:
-        """The result of a fit that has ended at these numbers."""
+        """Return the result of a fit that has ended at these parameters."""
         values, slopes = self.residuals(given)
         free = self.predictor.free
         posterior = posterior_of(slopes[:, :-1], free, x[len(START) : -4])

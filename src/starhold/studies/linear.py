@@ -1,4 +1,4 @@
-"""Linear loops of a scenario's laws: their margins, and the loops as systems of python-control."""
+"""Linear loops of a scenario's laws, their margins, and their systems for python-control."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ ORDER = 4
 
 @dataclass(frozen=True)
 class Systems:
-    """The parts of a linear loop: `plant` from command and disturbance (N m, body axes) to its states, `law` from these to
-    the command, `loop` from a command to the negative of the law's answer, and `closed` from the disturbance to states and
-    command. States begin with the error's rotation vector theta (rad) and the rate relative to the target (rad/s)."""
+    """The systems of a linear loop: `plant` from command and disturbance (N m, body axes) to its states, `law` from these to
+    the command, `loop` from a command to the negative of the law's response, and `closed` from the disturbance to states and
+    command. The first states are the error's rotation vector theta (rad) and the rate relative to the target (rad/s)."""
 
     plant: StateSpace
     law: StateSpace
@@ -37,8 +37,8 @@ class Systems:
 
 @dataclass(frozen=True)
 class LinearLoop(Systems):
-    """A linear loop in continuous time, with an approximated delay, and `sampled`, exact between control instants;
-    `left_out` names parts of the flying loop that it lacks. `starhold.margins` computes its margins."""
+    """A linear loop in continuous time, with an approximated delay, and `sampled`, exact at control instants; `left_out`
+    names parts of the true loop that it lacks. `starhold.margins` computes its margins."""
 
     sampled: Systems
     delay: float
@@ -58,7 +58,7 @@ def margins_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> list[
     where there is no linear loop."""
     linear = linear_of(scenario, entry, delay)
     if not linear.is_stable:
-        why = f"a pole of a step of the linear loop has size {abs(linear.poles[0]):.6g}, so the loop is not stable"
+        why = f"a pole of the sampled linear loop has magnitude {abs(linear.poles[0]):.6g}, so the loop is not stable"
         warnings.warn(f"{scenario.where}: law {entry.name}: {why} and has no margins", stacklevel=3)
     return margins(linear)
 
@@ -99,7 +99,7 @@ def _delayed(plant: System, delay: float, control: Any) -> System:
     """Return the plant in series with a Pade approximant of the delay of each command."""
     if delay == 0.0:
         return plant
-    # Loading it takes half a second, which runs without a delay are spared.
+    # Imported here, because loading takes half a second and is needed only with a delay.
     from scipy.signal import tf2ss
 
     a, b, c, d = (np.kron(np.eye(3), part) for part in tf2ss(*control.pade(delay, ORDER)))

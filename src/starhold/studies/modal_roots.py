@@ -1,4 +1,4 @@
-"""The roots of the modal law that slew fastest within a scenario's limits: the search, and a fit of its results."""
+"""Searches for the roots of the modal law that slew fastest within a scenario's limits, and fits the results."""
 
 import math
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from starhold.scenario.reading import LawEntry, Scenario
 
 Notice: TypeAlias = Callable[[int, int, str], None]
 DIGITS = 6
-"""The printed digits of the fit; the roots have three or four."""
+"""The number of printed digits of the fit; the roots have three or four."""
 PUBLISHED_FOR: dict[str, Any] = {
     "rate_limit": math.radians(30.0),
     "acceleration_limit": math.radians(50.0),
@@ -30,13 +30,13 @@ PUBLISHED_FOR: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Study:
-    """The results of a search, angle by angle; their fit, None for too few angles; and the published one, None where the
-    limits or the start are not the published ones."""
+    """The results of a search by angle; their fit, None for too few angles; and the published fit, None where limits or
+    start differ from the published ones."""
 
     results: list[Found]
     b: float
     eased: bool
-    """Whether the limits were tried with tolerances too."""
+    """Whether the search was also run with the tolerances on the limits."""
     fitted: TwoPieceFit | None
     published: TwoPieceFit | None
 
@@ -51,13 +51,13 @@ class Study:
         return np.array([math.nan if item.hard is None else item.hard.root for item in self.results])
 
     def fits(self) -> dict[str, TwoPieceFit]:
-        """The fits by their names in tables; empty where there are none."""
+        """The fits by name in tables; empty where there are none."""
         both = {"fit": self.fitted, "published": self.published}
         return {name: pieces for name, pieces in both.items() if pieces is not None}
 
 
 def pick_modal(scenario: Scenario, law: str | None) -> LawEntry:
-    """Return the law of this name, or the first modal one. InputError where it is not modal, or without limits."""
+    """Return the law of this name, or the first modal one. InputError where it is not modal or there are no limits."""
     if scenario.table.transient is None:
         raise InputError(scenario.where, "transient", "no such table", "a [transient] table with limits")
     if scenario.table.target.mode != "inertial":
@@ -72,8 +72,8 @@ def pick_modal(scenario: Scenario, law: str | None) -> LawEntry:
 
 
 def study(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, total, what: None) -> Study:
-    """Run the search of a scenario, with a law from `pick_modal`, of which only b matters. `notice` is called with the
-    number of angles done. InputError where no root keeps the limits from some angle."""
+    """Return the results of a scenario's search, with a law from `pick_modal`, of which only b matters. `notice` is called
+    with the number of angles done. InputError where no root keeps within the limits from some angle."""
     table: Any = scenario.table.transient
     limits, eased = _limits(table)
     problem = problem_of(scenario, entry)
@@ -94,7 +94,7 @@ def problem_of(scenario: Scenario, entry: LawEntry) -> SlewProblem:
 
 
 def _limits(table: TransientTable) -> tuple[Limits, Limits]:
-    """Return the limits, hard and with their tolerances."""
+    """Return the limits, without and with their tolerances."""
     hard = Limits(table.rate_limit, table.acceleration_limit)
     return hard, Limits(hard.rate + table.rate_tolerance, hard.acceleration + table.acceleration_tolerance)
 
@@ -106,7 +106,7 @@ def _as_published(table: TransientTable, b: float) -> bool:
 
 
 def _unreachable(scenario: Scenario, problem: SlewProblem, angle: float, limits: Limits) -> InputError:
-    """Return the error that names the limit that cannot be kept from an angle."""
+    """Return the error that names the limit that no root keeps within from an angle."""
     table: Any = scenario.table.transient
     why, duration = unmet(problem, angle, table.roots, limits), f"{problem.steps * problem.loop.period:g} s"
     ended = f"from {math.degrees(angle):.4g} deg no root that settles within {duration}"
@@ -124,7 +124,7 @@ def _unreachable(scenario: Scenario, problem: SlewProblem, angle: float, limits:
 
 
 def law_lines(pieces: TwoPieceFit, b: float) -> list[str]:
-    """Return a [[law]] table in TOML that takes its root from a fit."""
+    """Return the lines of a [[law]] table in TOML whose root is given by a fit."""
     below, above = ([float(f"{x:.{DIGITS}g}") for x in piece] for piece in (pieces.below, pieces.above))
     split = f'split = "{math.degrees(pieces.split):.{DIGITS}g} deg"'
     return ["[[law]]", 'type = "modal"', 'form = "fit"', f"below = {below}", f"above = {above}", split, f"b = {b!r}"]

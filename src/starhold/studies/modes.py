@@ -1,4 +1,4 @@
-"""Flights of modes: when they switch, and the certificates of each mode and of each hand-over."""
+"""Flights of laws with modes: their switches, and the certificates of each mode and hand-over."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ if TYPE_CHECKING:
 
 NEXT = "another mode begins"
 SEEN = 2_000
-"""The number of samples of a run at which conditions that never held are evaluated again."""
+"""The most samples of a run at which conditions that never held are evaluated again."""
 SPARE, SLOW = 1.05, math.radians(0.3)
-"""The margin of a rate that a mode hands over, and the least rate (rad/s) from which the next mode is to be proved."""
+"""The factor on the rate at a hand-over, and the least rate (rad/s) from which the next mode is to be proved."""
 STORED, RELEASED = "wheel_momentum_above", "wheel_momentum_below"
 """The tests of a switch for the wheels' momentum."""
 
 
 class Stretch(NamedTuple):
-    """A mode, counted from 1, that flies from the control step `first` to `last` (None: the end)."""
+    """An interval in which a mode, counted from 1, is active: control steps `first` to `last` (None: to the end)."""
 
     mode: int
     first: int
@@ -48,8 +48,8 @@ class Stretch(NamedTuple):
 
 
 def stretches(run: Recording) -> list[Stretch]:
-    """The modes of a recorded run, one after another; none of a law without modes. One that begins and ends between two
-    samples is not among them."""
+    """Return the modes of a recorded run in order; none for a law without modes. A mode that begins and ends between two
+    samples is missing."""
     if "mode" not in run.arrays:
         return []
     period = run.attrs["control_period"]
@@ -63,8 +63,8 @@ def stretches(run: Recording) -> list[Stretch]:
 
 
 def modes_flown(law: Law, run: Recording, epoch: Date | None = None) -> tuple[Begun, ...]:
-    """The modes of a recorded run by their names, with the times at which they begin, which are control instants; epoch: of
-    a flight whose modes have dates."""
+    """Return the modes of a recorded run with the control instants at which they begin; epoch: that of the flight, if its
+    modes use dates."""
     period, module = run.attrs["control_period"], law.module
     begun: list[Begun] = []
     for mode, first, _ in stretches(run):
@@ -77,8 +77,8 @@ def modes_flown(law: Law, run: Recording, epoch: Date | None = None) -> tuple[Be
 
 
 def never_begun(law: Law, gains: Any, run: Recording) -> tuple[str, ...]:
-    """Sentences, without their full stop, about the modes that a mode of a recorded run could have led to, and none of its
-    modes did; that of a loss aside."""
+    """Return sentences, without full stops, about the modes that could have followed a mode of a recorded run but never
+    began; the mode on a loss is left out."""
     module: Any = law.module
     flown = {one.mode - 1 for one in stretches(run)}
     said: list[str] = []
@@ -96,8 +96,8 @@ def never_begun(law: Law, gains: Any, run: Recording) -> tuple[str, ...]:
 
 
 def _missed(module: Modes, gains: Any, run: Recording, switch: Switch, numbers: list[Any]) -> str:
-    """Why the condition of a switch, with these numbers, held nowhere in a run, as far as one of its tests says it alone;
-    only the position of the craft and the time are considered."""
+    """Return the reason why a switch's condition, with these numbers, never held in a run, if a single test explains it;
+    only tests of the craft's position and of time are considered."""
     (after, dwell, *levels), end = numbers, float(run["time"][-1])
     given = dict(zip(switch.keys, levels, strict=True))
     begin = max(after, given.get("not_before", 0.0)) + dwell
@@ -116,7 +116,7 @@ def _missed(module: Modes, gains: Any, run: Recording, switch: Switch, numbers: 
 
 
 def _holds(test: str, given: dict[str, Any], watch: Any, run: Recording, place: int, period: float) -> bool:
-    """Whether a test that looks at the craft's place holds at a sample."""
+    """Return whether a test of the craft's position holds at a sample."""
     state: Any = SimpleNamespace(position=tuple(run["position"][place].tolist()))
     clock = watch._replace(clock=round(float(run["time"][place]) / period))
     measurement: Any = SimpleNamespace(period=period)
@@ -124,22 +124,22 @@ def _holds(test: str, given: dict[str, Any], watch: Any, run: Recording, place: 
 
 
 def epoch_of(scenario: Scenario, law: Law) -> Date | None:
-    """The epoch of a flight whose law has conditions on dates, stations or the Sun; None for other laws."""
+    """Return the epoch of a flight whose law has conditions on dates, stations or the Sun; None for other laws."""
     dated = isinstance(law.module, Modes) and law.module.WATCHES and hasattr(scenario.table, "orbit")
     return scenario.table.orbit.epoch if dated and scenario.table.orbit is not None else None
 
 
 def begins_asked(scenario: Scenario, law: Law) -> dict[str, int]:
-    """The modes of a law whose first begin campaigns are required to have, counted from 1, by the columns of those
-    requirements."""
+    """Return the modes of a law, counted from 1, whose first beginning is required in campaigns, by the requirements'
+    columns."""
     tables = [one for one in scenario.table.requirement if one.metric == BEGINS and one.method == "campaign"]
     names = [mode.name for mode in law.module.modes] if isinstance(law.module, Modes) else []
     return {column_of(one): names.index(str(one.in_mode)) + 1 for one in tables if one.in_mode in names}
 
 
 def parts_asked(scenario: Scenario, law: Law) -> dict[str, tuple[str, Span]]:
-    """The parts of a flight in which campaigns are required to bound an error, with that error, by the columns of those
-    requirements. InputError for times that are none, or not within the flight."""
+    """Return the error and the part of a flight in which campaigns must bound it, by the requirements' columns. InputError
+    for times that are invalid or outside the flight."""
     names = [mode.name for mode in law.module.modes] if isinstance(law.module, Modes) else []
     timing, parts = scenario.table.simulation, dict[str, tuple[str, Span]]()
     for key, table in tables_of(scenario, "campaign").items():
@@ -151,8 +151,8 @@ def parts_asked(scenario: Scenario, law: Law) -> dict[str, tuple[str, Span]]:
 
 
 def first_fault(scenario: Scenario, loop: ClosedLoop) -> tuple[float, ...]:
-    """The instant at which the first fault of a flight happens, a sensor's outage among them: infinite without any, none
-    where the law notices no losses, or a campaign draws outages, which all lanes of a loop do not share."""
+    """Return the time of the first fault of a flight, including sensor outages: infinite if there are none; an empty tuple
+    where the law detects no losses, or a campaign draws outages, so that lanes differ in them."""
     campaign = scenario.table.campaign
     drawn = campaign is not None and any(".outage" in key for key in campaign.over)
     if drawn or not isinstance(loop.law.module, Modes) or loop.law.module.on_loss is None:
@@ -163,14 +163,14 @@ def first_fault(scenario: Scenario, loop: ClosedLoop) -> tuple[float, ...]:
 
 
 def named_modes(loop: ClosedLoop, name: str) -> dict[str, ClosedLoop]:
-    """The loop of each mode of a law, by the name of its certificate."""
+    """Return the loop of each mode of a law, by the name of its certificate."""
     modes: Any = loop.law.module.modes
     return {f"{name}: {mode.name}": loop_of_mode(loop, place) for place, mode in enumerate(modes)}
 
 
 class HandOver(NamedTuple):
-    """A switch from a mode to another, counted from 0, with the loops of both, the levels of its tests (rad/s, rad), and the
-    least time in the mode before (s); `key`: "until" or "back"."""
+    """A switch between two modes, counted from 0, with the loops of both, the levels of its tests (rad/s, rad), and the
+    least time (s) in the previous mode; `key`: "until" or "back"."""
 
     name: str
     places: tuple[int, int]
@@ -200,13 +200,13 @@ def hand_overs(loop: ClosedLoop, name: str) -> list[HandOver]:
 
 
 def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
-    """The certificates of the law of each mode, and of each switch whose next mode is known to converge."""
+    """Return the certificates of each mode's law, and of each switch to a mode that is proved to converge."""
     from starhold.certification.certify import certify
     from starhold.certification.hand_over import flown_ends, hand_over
 
     issued, switches, flown = list[Issued](), hand_overs(loop, name), list[Any]()
     for place, (title, mode_loop) in enumerate(named_modes(loop, name).items()):
-        # What modes before hand over, as far as they come before it, and a little more for errors.
+        # The rates that earlier modes hand over, with a margin for errors.
         rates = [
             flown_ends(one.levels, one.before, one.after, flown[one.places[0]], None)[0] * SPARE
             for one in switches
@@ -227,9 +227,9 @@ def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
 
 
 def most_stored(loop: ClosedLoop, place: int, rate: float = 0.0) -> float:
-    """Return the largest momentum of the wheels (N m s) at which a mode ends because of it; for a mode that does not, at
-    which another one ends to begin it; where none does, what the rotors and a body at this rate (rad/s) have, if the mode
-    follows one in which wheels are inactive; otherwise inf. Claims about the mode assume no more."""
+    """Return the largest momentum (N m s) of the wheels that claims about a mode need to assume: the level at which the mode
+    ends, else the level at which another mode hands over to it, else, after a mode with inactive wheels, the momentum of the
+    rotors plus that of a body at this rate (rad/s); otherwise inf."""
     switches = hand_overs(loop, "")
     ends = [(one.places, one.levels[STORED]) for one in switches if STORED in one.levels]
     ending, beginning = ([level for places, level in ends if places[side] == place] for side in (0, 1))
@@ -238,8 +238,8 @@ def most_stored(loop: ClosedLoop, place: int, rate: float = 0.0) -> float:
 
 
 def fresh_momentum(one: HandOver, rate: float) -> float:
-    """Return the largest momentum (N m s) with which a mode begins at this rate (rad/s) after one in which wheels are
-    inactive, so that their rotors keep what they have; inf after another one, and 0 without wheels."""
+    """Return the largest momentum (N m s) with which a mode begins at this rate (rad/s) after a mode with inactive wheels,
+    whose rotors keep their momentum; inf after any other mode, and 0 without wheels."""
     craft, wheels = one.after.craft, one.after.wheels
     if wheels is None:
         return 0.0
@@ -250,14 +250,14 @@ def fresh_momentum(one: HandOver, rate: float) -> float:
 
 
 def left_momentum(one: HandOver, rate: float) -> float:
-    """Return the largest momentum (N m s) at which a switch happens while the body turns at a rate (rad/s): what it allows
-    the wheels, and the body's; inf where it allows any."""
+    """Return the largest momentum (N m s) at which a switch happens at a rate (rad/s) of the body: the wheels' momentum that
+    it allows plus that of the body; inf where it allows any."""
     return one.levels.get(RELEASED, math.inf) + float(np.linalg.eigvalsh(tensor(one.after.craft.inertia))[-1]) * rate
 
 
 def flown_stretches(issued: Issued, run: Recording, end: int | None) -> list[Stretch]:
-    """Return the stretches of a recorded run in which the mode flies that a certificate is about, after the mode before if
-    it is about a switch, and with the certificate's loop, which flies up to the control step `end` (None: always)."""
+    """Return the stretches of a recorded run in which a certificate's mode flies (for a switch, only after the previous
+    mode) with the certificate's loop, which flies up to the control step `end` (None: always)."""
     flown = stretches(run)
     befores = [None, *(one.mode for one in flown)]
     spans = [

@@ -1,4 +1,4 @@
-"""A fit determines this of its free numbers: their covariance, and by name the combinations that no reading depends on."""
+"""The covariance of a fit's free numbers, and the names of the combinations on which no reading depends."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from starhold.scenario.reading import Scenario
 from starhold.studies.fitting import Array, Free
 
 UNDETERMINED = 1e-8
-"""A combination of free numbers, each measured by how much readings depend on it, counts as undetermined if its singular
-value is below this share of the largest."""
+"""A combination of free numbers, each scaled by its influence on readings, counts as undetermined if its singular value is
+below this share of the largest."""
 SHARE = 1e-4
-"""Numbers that take a smaller share in such a combination are not named."""
+"""Numbers with a smaller share in such a combination are not named."""
 ALIKE = 1e-4
-"""Vectors are proportional where the square of the sine between them is below this."""
+"""Vectors count as proportional if the squared sine of the angle between them is below this."""
 SIZELESS = 1e4
-"""A key without a size is measured in units of what its readings alone would leave uncertain, times this."""
+"""The factor on the uncertainty that readings alone would leave, which gives the scale of a key without a size."""
 LEVEL = 0.95
 WIDTH = float(stats.norm.ppf(0.5 + 0.5 * LEVEL))
-"""Half the interval of this level, in standard deviations."""
+"""The half-width of the confidence interval at `LEVEL`, in standard deviations."""
 
 
 class Posterior(NamedTuple):
     """The covariance of the free numbers, infinite on the diagonal for undetermined ones; undetermined: directions (m, free)
-    along which readings do not change, and sentences that name them; rank: combinations that are determined, the start's
-    included; singular: the singular values of the weighted Jacobian with columns of length 1."""
+    along which readings do not change, and sentences that name them; rank: the number of determined combinations, including
+    the start's; singular: the singular values of the weighted Jacobian with columns of unit length."""
 
     covariance: Array
     undetermined: Array
@@ -37,27 +37,28 @@ class Posterior(NamedTuple):
     singular: Array
 
     def barely(self, free: Free) -> Any:
-        """Which numbers are determined no better than to the size of their key."""
+        """Return a mask of the numbers whose uncertainty is not smaller than the size of their key."""
         return self.is_determined & (free.sizes > 0.0) & (WIDTH * self.deviations > free.sizes)
 
     @property
     def deviations(self) -> Array:
-        """Standard deviations of the free numbers."""
+        """The standard deviations (free,) of the free numbers."""
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
     def is_determined(self) -> Any:
-        """Which numbers are determined."""
+        """A mask (free,) of the determined numbers."""
         return np.isfinite(np.diagonal(self.covariance))
 
     @property
     def correlations(self) -> Array:
-        """Correlations of the free numbers, NaN of undetermined ones."""
+        """The correlations (free, free) of the free numbers, NaN for undetermined ones."""
         sizes = np.where(self.is_determined, self.deviations, np.nan)
         return self.covariance / np.outer(sizes, sizes)
 
     def over(self, scenario: Scenario, free: Free, values: Array) -> Scenario:
-        """The scenario with a campaign that draws the determined numbers jointly, whole matrices apart."""
+        """Return the scenario with a campaign that draws the determined numbers jointly, except whole matrices, which are
+        drawn separately."""
 
         tables = dict[str, Any](read_toml(scenario.text, scenario.where).get("campaign", {}))
         dropped = {place.key for place in free.places}
@@ -81,15 +82,15 @@ class Posterior(NamedTuple):
 
 
 def _table(covariance: Array) -> dict[str, Any]:
-    """The distribution of numbers about those of the file."""
+    """Return the table of a joint normal distribution about the file's values."""
     if len(covariance) == 1:
         return {"distribution": "normal", "sigma": float(np.sqrt(covariance[0, 0]))}
     return {"distribution": "correlated-normal", "covariance": (0.5 * (covariance + covariance.T)).tolist()}
 
 
 def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
-    """Return what residuals of unit variance with these slopes (n, start + free) determine; the start is estimated too."""
-    # As few rows as there are numbers have the same squares.
+    """Return the posterior from residuals of unit variance with slopes (n, start + free); the start is estimated too."""
+    # Reduced to as many rows as there are numbers, with the same sum of squares.
     few: Any = np.linalg.qr(slopes, mode="r")
     slopes = few
     lengths = np.linalg.norm(slopes, axis=0)
@@ -105,7 +106,7 @@ def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
     undetermined = _reduced(combined[among > SHARE] / lengths[first:] / sizes)
     for k in np.flatnonzero((np.abs(undetermined) > SHARE).any(axis=0)):
         covariance[k, k] = np.inf
-    # What is left of the free numbers once the start has explained what it can.
+    # The slopes of the free numbers after projecting out those of the start.
     few = np.linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")
     _, known, axes = np.linalg.svd(few[first:, first:])
     hardly = _reduced(axes[: len(axes) - len(undetermined)][known[: len(axes) - len(undetermined)] < WIDTH])
@@ -115,7 +116,8 @@ def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
 
 
 def _reduced(rows: Array) -> Array:
-    """A basis of the space of independent rows in which each has a number of its own, the largest, as far as it goes."""
+    """Return a basis of the row space, reduced so that the pivot of each row, as large as possible, is zero in the
+    others."""
     if not len(rows):
         return rows
     basis = linalg.orth(rows.T).T
@@ -125,7 +127,8 @@ def _reduced(rows: Array) -> Array:
 
 
 def _sentence(row: Array, free: Free, values: Array, verb: str) -> str:
-    """Name a combination on which readings do not depend, or not beyond their noise; row and values in sizes."""
+    """Return a sentence that names a combination on which readings do not depend, or only within their noise; row, values:
+    in units of the numbers' sizes."""
     named = np.flatnonzero(np.abs(row) > SHARE * np.abs(row).max())
     names, shares, known = [free.names[k] for k in named], row[named], values[named]
     why = "no reading depends on it" if verb == "do not determine" else "its standard deviation exceeds its size"

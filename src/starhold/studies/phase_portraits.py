@@ -1,4 +1,4 @@
-"""Phase portraits of a system with its certified sets, one for each claim."""
+"""Phase portraits of a system with its certified sets, one per claim."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,20 +15,22 @@ from starhold.certification.invariant.theorems import common, indicator
 POINTS = 400
 """The number of points along each side of a portrait."""
 COARSE, STEPS = 121, 10
-"""The number of points with more than two variables, and how often a grid over the others shrinks."""
+"""The number of points per side with more than two variables, and the number of times that a grid over the others
+shrinks."""
 AHEAD = 60.0
-"""How long a motion is followed backwards until it reaches the border of the true region."""
+"""The time over which a motion is followed backwards to the boundary of the true region of attraction."""
 TINY = 1e-12
 """Rates below this count as zero."""
 
 
 @dataclass(frozen=True)
 class Portrait:
-    """The plane of the first two variables with the sets of a claim, parameters in the middle of their intervals.
+    """The plane of the first two variables with the sets of a claim, for parameters at the midpoints of their intervals.
 
-    x, y: (n,); V: (n, n), by y, then x, with more variables the least (unstable: greatest) over them; u, v: the same shape,
-    None with more; orbit: (2, points), the border of the true region, with its area; marks: states that refute; sets:
-    functions (n, n) that are not negative in the start and unsafe sets. One variable: no arrays."""
+    x, y: (n,); V: (n, n), indexed by y, then x; with further variables its minimum (for instability maximum) over them; u,
+    v: the vector field, (n, n), None with further variables; orbit: the boundary (2, points) of the true region, with its
+    area; marks: states that refute the claim; sets: functions (n, n), nonnegative in the start and unsafe sets. With one
+    variable there are no arrays."""
 
     claim: Claim
     names: tuple[str, ...]
@@ -45,14 +47,14 @@ class Portrait:
 
 
 def portraits(problem: InvariantProblem, certificate: Certificate) -> list[Portrait]:
-    """Return a portrait of each claim, in floats."""
+    """Return a portrait of each claim, computed in floating point."""
     pairs = zip(problem.claims, certificate.claims, strict=True)
     return [_portrait(problem, wanted, claim, problem.orbit(k)) for k, (wanted, claim) in enumerate(pairs)]
 
 
 def paths(system: System, box: Sequence[tuple[float, float]], starts: Any, length: float, steps: int = 400) -> Any:
-    """Follow motions from starts (n, N) in steps of arc length, backwards in time where the length is negative; one that
-    would reverse, as at an equilibrium, ends. Return (N, n, steps + 1), with parameters in the middle of their intervals.
+    """Return motions (N, n, steps + 1) from starts (n, N), in steps of arc length, backwards in time for a negative length,
+    with parameters at the midpoints of their intervals. A motion that would reverse, as at an equilibrium, ends.
     """
     what = Candidate(system, Polynomial.constant(0), tuple(box))
     moving, count = len(system.variables), np.shape(starts)[1]
@@ -102,8 +104,8 @@ def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start:
 
 
 def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
-    """Return sign V at points (n, N), the least over the variables from the third on, by grids that shrink around the best
-    point."""
+    """Return the minimum of sign * V at points (n, N) over the third and further variables, by grids that shrink around the
+    best point."""
     best, values = points.copy(), np.full(points.shape[1], np.inf)
     width = np.array([0.5 * (high - low) for low, high in what.box[2:moving]])
     for step in range(STEPS):
@@ -120,8 +122,7 @@ def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
 
 
 def _orbit(what: Candidate, start: Any) -> Any:
-    """Return one period of the closed orbit that the motion from a state reaches backwards in time; None where it reaches
-    none."""
+    """Return one period of the closed orbit to which the motion from a state converges backwards in time, or None."""
     from scipy.integrate import solve_ivp
 
     others = [0.5 * (low + high) for low, high in what.box[2:]]

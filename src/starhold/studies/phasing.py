@@ -1,4 +1,4 @@
-"""Sheets for the test of signs and axes before launch: what each stage of a loop shows under each stimulus."""
+"""Sheets for the polarity and axes test before launch: the expected output of each stage of a loop under each stimulus."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from starhold.studies.phasing_bench import ORDER, TORQUE, Bench, Stage, Stimulus
 SMALL = 0.25
 """A number below this share of the largest of its vector counts as 0."""
 NOTHING = 1e-9
-"""A vector below this share of the largest one of its kind is not shown."""
+"""A vector below this share of the largest of its kind is left out."""
 
 
 class Cell(NamedTuple):
-    """A number of a sheet, in `unit`: the expected sign and value, and where it stands: the numbers of the stimulus and of
-    the stage, and the place in the stage's vector, which is SI."""
+    """A number of a sheet: its expected sign, its value in `unit`, the indices of its stimulus and stage, and its index in
+    the stage's vector, which is in SI."""
 
     stimulus: str
     stage: str
@@ -33,13 +33,12 @@ class Cell(NamedTuple):
     at: tuple[int, int]
     place: int
     block: tuple[int, int]
-    """Where the numbers of its vector begin and end."""
+    """The first index of its vector, and the one after the last."""
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A sheet of a law: its cells, the stages in the order of the loop, the stimuli, and sentences about what is not
-    tested."""
+    """The sheet of a law: its cells, the stages in the order of the loop, the stimuli, and sentences about omissions."""
 
     cells: list[Cell]
     stages: list[Stage]
@@ -48,7 +47,7 @@ class Sheet:
 
 
 def sheet_of(loop: ClosedLoop, law: str) -> Sheet:
-    """The sheet of a loop; of a law made of modes for each mode, without what an earlier one shows."""
+    """Return the sheet of a loop; for a law with modes it covers each mode, without rows that an earlier mode has."""
     modes = mode_laws(loop.law, loop.gains)
     loops = [(f"{mode}: ", loop_of_mode(loop, place), mode) for place, (mode, _, _) in enumerate(modes)]
     benches = [(before, Bench(alone, name)) for before, alone, name in loops or [("", loop, law)]]
@@ -93,7 +92,7 @@ def sheet_of(loop: ClosedLoop, law: str) -> Sheet:
 
 
 def _notes(loop: ClosedLoop, cells: Sequence[Cell], laws: Sequence[str]) -> list[str]:
-    """Sentences about what the sheet does not test."""
+    """Return sentences about what the sheet does not test."""
     shown = {cell.stage.partition(":")[0] for cell in cells}
     parts = [f.called for role in ("sensor", "estimator", "effector") for f in loop.used(role)]
     notes = [f"{name}: no stimulus of this sheet moves it in body axes." for name in parts if name not in shown]
@@ -101,9 +100,11 @@ def _notes(loop: ClosedLoop, cells: Sequence[Cell], laws: Sequence[str]) -> list
         n for n in parts if n in shown and {c.stage for c in cells if c.stage.startswith(f"{n}: ")} == {f"{n}: {TORQUE}"}
     ]
     notes += [f"{name}: the sheet gives its total torque, not what each of its units does." for name in whole]
-    notes += [f"{f.called}: it passes the command on in time; the sheet leaves it out." for f in loop.used("actuator")]
+    notes += [
+        f"{f.called}: the sheet leaves it out, as if it passed the command on unchanged." for f in loop.used("actuator")
+    ]
     silent = [name for name in laws if name not in shown]
-    notes += [f"{name}: this law asks for nothing at its first instant; the sheet begins with a torque." for name in silent]
+    notes += [f"{name}: this law commands nothing at its first instant; the sheet begins with a torque." for name in silent]
     if not loop.used("sensor"):
-        notes.insert(0, "The loop has no sensors: the law is given the state as it is.")
+        notes.insert(0, "The loop has no sensors: the law is given the true state.")
     return notes

@@ -1,4 +1,4 @@
-"""A loop on a bench: the equations that fly tell what each of its stages shows under stimuli by hand or by coil."""
+"""A loop on a test bench: the flown equations give the output of each stage under stimuli by hand or by coil."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ AXES = "xyz"
 TURN = math.radians(10.0)
 """The craft is turned by this angle (rad), and at this rate (rad/s)."""
 STATED = ("attitude", "rate")
-"""Quantities of the body's state that have body axes; the attitude as the turn since the craft stood on target."""
+"""Quantities of the body's state with components in body axes; the attitude as the turn from the target."""
 
 
 class Block(NamedTuple):
-    """A vector that a stage shows: its name, its unit and how many numbers it has."""
+    """A vector that a stage outputs: its name, unit and number of components."""
 
     name: str
     unit: str
@@ -38,12 +38,12 @@ class Block(NamedTuple):
 
     @property
     def labels(self) -> list[str]:
-        """The names of its numbers."""
+        """The names of its components."""
         return list(AXES) if self.size == 3 and self.name != MOTORS else [str(k + 1) for k in range(self.size)]
 
 
 MOTORS, TORQUE, ACTUATORS = "motor torque", "torque on the body", "actuators"
-"""The names of what each wheel gives, of what acts, and of what gives it in a loop without effectors."""
+"""The names of the torque of each wheel, of the torque on the body, and of its source in a loop without effectors."""
 UNITS: dict[str, tuple[Block, Any, Any]] = {
     "dipole": (Block("dipole", "A m^2"), lambda s: s.dipole, lambda s, v: s._replace(dipole=v)),
     "firing": (
@@ -52,13 +52,13 @@ UNITS: dict[str, tuple[Block, Any, Any]] = {
         lambda s, v: s._replace(firing=tuple(map(sign, v)), left=tuple(map(abs, v))),
     ),
 }
-"""For effectors with `switch`, by a field of their state: the block of what each unit does, how it is read from the state,
-and how a state is made that has another."""
+"""For effectors with `switch`, by a field of their state: the block for the outputs of the units, the function that reads
+these from a state, and the function that returns a state with other outputs."""
 
 
 class Stage(NamedTuple):
-    """A part shows here what it makes of the stages before; kind: "reading", "estimate", "command", "share" (of each unit
-    of an effector) or "torque" (on the body)."""
+    """A stage of the loop: the output of a part for the outputs of the stages before it; kind: "reading", "estimate",
+    "command", "share" (of each unit of an effector) or "torque" (on the body)."""
 
     kind: str
     part: str
@@ -69,7 +69,7 @@ ORDER = ("reading", "estimate", "command", "share", "torque")
 
 
 def blocks_of(stage: Stage) -> Iterator[tuple[Block, int]]:
-    """The blocks of a stage, each with the place at which it begins."""
+    """Yield the blocks of a stage, each with the index of its first component."""
     first = 0
     for block in stage.blocks:
         yield block, first
@@ -77,8 +77,8 @@ def blocks_of(stage: Stage) -> Iterator[tuple[Block, int]]:
 
 
 class Stimulus(NamedTuple):
-    """A stimulus: words, the carry of the loop, the commanded torque (None: the law commands), the stages that answer to it,
-    and the quantities of sensors and estimator that the sheet shows."""
+    """A stimulus: its description, the carry of the loop, the commanded torque (None: the law commands), the stages that
+    respond to it, and the quantities of sensors and estimator in the sheet."""
 
     name: str
     carry: Any
@@ -89,7 +89,7 @@ class Stimulus(NamedTuple):
 
 
 class _Stand:
-    """Replaces the module of a part, with some of its equations exchanged."""
+    """A stand-in for the module of a part, with some of its equations replaced."""
 
     def __init__(self, module: Any, **equations: Any) -> None:
         self.__dict__ |= equations | {"_module": module}
@@ -124,7 +124,7 @@ class Bench:
         self._step = make_step(parts._replace(sensors=sensors, estimator=estimator, effectors=effectors))
 
     def vectors(self, stimulus: Stimulus, said: Mapping[Stage, Array]) -> dict[Stage, Array]:
-        """Tell what each stage shows (SI) where some of those before it show what is said."""
+        """Return the output of each stage (SI), with the outputs of some stages replaced by those in `said`."""
         self._said, self._shown = said, {}
         given = said.get(self.command)
         wanted = stimulus.given if given is None else tuple(given.tolist())
@@ -137,7 +137,7 @@ class Bench:
         return self._shown
 
     def _listened(self, fitted: Fitted) -> Part:
-        """A sensor or estimator that shows its vectors in body axes and accepts others in their place."""
+        """Return a sensor or estimator that outputs its vectors in body axes and accepts others in their place."""
         module, sensor = fitted.part.module, fitted.part.role == "sensor"
         kind = module.Reading if sensor else module.Estimate
         others = [n for n in kind._fields if sensor and n not in self.rest._fields]
@@ -170,7 +170,7 @@ class Bench:
         return replace(fitted.part, module=_Stand(module, **equation))  # pyright: ignore[reportArgumentType]
 
     def _watched(self, fitted: Fitted, params: Any) -> Part:
-        """An effector that shows its torque and what each of its units does, and accepts other values for the units."""
+        """Return an effector that outputs its torque and those of its units, and accepts other values for the units."""
         module: Any = fitted.part.module
         acts = fitted.part.flag("ACTS")
         if not acts and not fitted.part.flag("OUTSIDE"):
@@ -198,7 +198,7 @@ class Bench:
                     self._shown[units] = self._said[units]
             given = act(inner, command, body, params)
             self._shown[torque] = np.array(given)
-            # A rod that is turned acts in the field as it lies; other units take their torque with them.
+            # A rotated rod acts on the field in its new direction; the torque of other units rotates with them.
             lies = lambda m: act(*moved(inner, command, m @ inner.dipole), body, params)  # noqa: E731
             self.mounts[torque] = lies if field == "dipole" else lambda m: m @ np.array(given)
             return given
@@ -214,7 +214,7 @@ class Bench:
         return rotation_vector(relative(self.rest.attitude, attitude))
 
     def turned(self, turn: Vector) -> Quaternion:
-        """The attitude after a turn (rad, body axes) of the craft as it rests."""
+        """Return the attitude after a turn (rad, body axes) of the resting craft."""
         angle = norm(turn)
         half = scale(math.sin(0.5 * angle) / angle if angle else 0.5, turn)
         return multiply(self.rest.attitude, (math.cos(0.5 * angle), *half))
@@ -222,7 +222,7 @@ class Bench:
     # --- Stimuli ------------------------------------------------------------------------------------------------------
 
     def stimuli(self, before: str) -> Iterator[Stimulus]:
-        """The stimuli of the loop, about each axis; before: with what their names begin."""
+        """Yield the stimuli of the loop about each axis; before: the beginning of their names."""
         loop, stages = self.loop, self.stages
         fields = [stage for stage in stages if stage.kind == "reading" and stage.blocks[0].name not in STATED]
         turning = tuple(stage for stage in stages if stage not in self._apart())
@@ -254,12 +254,12 @@ class Bench:
                 yield stimulus._replace(carry=self._spun(stimulus.carry, rotors, k))
 
     def _apart(self) -> tuple[Stage, ...]:
-        """The stages of effectors that take no command."""
+        """Return the stages of effectors that take no command."""
         names = [fitted.called for fitted in self.loop.used("effector") if not fitted.part.flag("ACTS")]
         return tuple(stage for stage in self.stages if stage.kind in ("share", "torque") and stage.part in names)
 
     def _fields(self, magnet: Stage | None, k: int) -> Iterator[tuple[str, Any]]:
-        """The craft at rest; and with the magnetic field along each of the two other axes."""
+        """Yield the state of the craft at rest, or with a magnet, with the field along each of the two other axes."""
         if magnet is None:
             yield "", self.rest
             return
@@ -271,7 +271,7 @@ class Bench:
         return Stimulus(name, self.loop.carry(state), given, live, shown, self)
 
     def _spun(self, carry: Any, rotors: Fitted, k: int) -> Any:
-        """The carry with a third of the momentum that the wheels hold about an axis, shared as they share a torque."""
+        """Return the carry with a third of the momentum that the wheels can store about an axis, allocated like a torque."""
         module, place = rotors.part.module, self.loop.used("effector").index(rotors)
         params = self.setup.effectors[place]
         most = min(params.momentum_limit)
@@ -281,7 +281,7 @@ class Bench:
         return carry._replace(effectors=tuple(effectors))
 
     def facing(self, stage: Stage, k: int) -> Any:
-        """The craft turned so that the first vector of a sensor lies along an axis; None where it shows none."""
+        """Return the state of the craft turned so that the first vector of a sensor lies along an axis; None without one."""
         place = [fitted.called for fitted in self.loop.used("sensor")].index(stage.part)
         fitted, params = self.loop.used("sensor")[place], self.setup.sensors[place]
 
@@ -291,7 +291,7 @@ class Bench:
             reading, _ = fitted.part.module.measure(state, fitted.remembered(params, state), params, dice, 0)
             return getattr(reading, stage.blocks[0].name)
 
-        # A sensor may see one side alone.
+        # A sensor may see only one side.
         sides = (NO_TURN, (0.0, 1.0, 0.0, 0.0), *((1.0, *_along(j, s)) for j in range(3) for s in (1.0, -1.0)))
         for side in map(normalise, sides):
             vector = to_reference(side, shown(side))
@@ -306,10 +306,10 @@ def _along(k: int, size: float) -> Any:
 
 
 def _turning(vector: Vector, axis: Vector) -> Quaternion:
-    """An attitude in which the body components of an inertial unit vector are those of `axis`."""
+    """Return an attitude in which the body components of an inertial unit vector are those of `axis`."""
     across = cross(axis, vector)
     if dot(axis, vector) < -0.9:
-        # Half a turn about whatever is perpendicular comes first.
+        # Half a turn about any perpendicular axis comes first.
         other = normalise((0.0, *cross(axis, (axis[1], axis[2], axis[0]))))
         return multiply(_turning(scale(-1.0, vector), axis), other)
     return normalise((1.0 + dot(axis, vector), *across))

@@ -1,4 +1,4 @@
-"""A sheet of signs and axes that was filled in is judged: which mistakes of which parts explain what was seen."""
+"""Judges a completed sheet of signs and axes: which mistakes of which parts explain the observations."""
 
 from __future__ import annotations
 
@@ -21,38 +21,38 @@ from starhold.studies.phasing import Cell, Sheet, sheet_of
 from starhold.studies.phasing_bench import ACTUATORS, AXES, MOTORS, ORDER, STATED, Array, Stage, Stimulus
 
 Test: TypeAlias = Callable[[Array], Any]
-"""Which of some vectors (n, k) agree with what was seen."""
+"""Returns a mask of the vectors (n, k) that agree with the observations."""
 SEEN = "seen"
 MOST = 2
-"""Stages that may be mistaken at once."""
+"""The largest number of stages that are assumed wrong at once."""
 NEAR = 0.35
-"""Numbers agree that differ by at most this share of the largest of their vector; the craft is turned by hand."""
+"""Numbers agree if they differ by at most this share of the largest in their vector: the craft is turned by hand."""
 CLEAR = 0.15
-"""A number has a sign from this share of the largest of its vector on."""
+"""A number has a sign if it is at least this share of the largest in its vector."""
 TINY, FLOOR = 0.02, 0.1
-"""An observed vector below the first share of the expected one counts as absent; up to the second it may be absent."""
+"""An observed vector counts as absent below the first share of the expected one, and as possibly absent below the second."""
 FAR = 3.0
-"""A vector this many times longer or shorter than it should be has another size."""
+"""The factor by which a vector must be longer or shorter than expected to count as of wrong magnitude."""
 SIGNS = {"+": 1.0, "-": -1.0, "\N{MINUS SIGN}": -1.0, "0": 0.0}
 SHOWN = 12
-"""The most explanations that are listed."""
+"""The largest number of explanations listed."""
 ALIKE = 1
-"""Decimals of a vector, relative to its largest number, by which stages are distinguished in the search."""
+"""The number of decimals, relative to a vector's largest number, to which the search distinguishes outputs."""
 
 
 class Seen(NamedTuple):
-    """A sheet as a file has it: its name, and its rows with the numbers of their lines."""
+    """A completed sheet: the file's name, and its rows with their line numbers."""
 
     where: str
     rows: list[tuple[int, dict[str, str]]]
 
 
 class Mistake(NamedTuple):
-    """A stage shows a signed permutation of what it should."""
+    """A mistake: a stage outputs a signed permutation of the right vector."""
 
     stage: Stage
     place: int
-    """Its number among `mistakes_of(stage)`."""
+    """Its index in `mistakes_of(stage)`."""
 
     @property
     def sentence(self) -> str:
@@ -70,8 +70,8 @@ class Mistake(NamedTuple):
 
 @dataclass(frozen=True)
 class Phasing:
-    """A sheet, and if one was filled in what was seen (None: nothing), the explanations with the fewest mistakes, single
-    mistakes that would not show where all that was seen is right, and sentences about sizes."""
+    """A sheet, and for a completed one the observations (None: an empty cell), the explanations with the fewest mistakes,
+    the single mistakes that would not show if all observations are right, and sentences about magnitudes."""
 
     sheet: Sheet
     seen: list[float | str | None] | None
@@ -81,8 +81,8 @@ class Phasing:
 
     @property
     def outcome(self) -> Literal["met", "missed", "undecided"]:
-        """Whether all signs are right ("met") or one is wrong ("missed"); "undecided" where rows are empty, a mistake would
-        not show, or a size is another."""
+        """The outcome: "met" if all signs are right, "missed" if one is wrong, "undecided" where rows are empty, a mistake
+        would not show, or a magnitude is unexpected."""
         if self.seen is None:
             return "met"
         if self.explanations != [()]:
@@ -91,7 +91,7 @@ class Phasing:
 
     @property
     def verdict(self) -> list[str]:
-        """Sentences: what was found."""
+        """The outcome in sentences."""
         if self.seen is None:
             return []
         empty = sum(value is None for value in self.seen)
@@ -111,14 +111,14 @@ class Phasing:
 
 
 def _listed(sets: Sequence[tuple[Mistake, ...]]) -> list[str]:
-    """The first of some sets of mistakes in words."""
+    """Return the first sets of mistakes in words."""
     listed = [f"{' and '.join(mistake.sentence for mistake in one)}." for one in sets[:SHOWN]]
     return listed + [f"And {len(sets) - SHOWN} more."] * (len(sets) > SHOWN)
 
 
 def study(scenario: Scenario, entry: LawEntry, seen: Seen | None = None) -> Phasing:
-    """The sheet of a law of a scenario, and what one that was filled in shows. InputError for a file that is not this
-    sheet."""
+    """Return the sheet of a law of a scenario, with the judgement of a completed one, if given. InputError for a file that
+    is not this sheet."""
     sheet = sheet_of(build(scenario, entry), entry.name)
     if seen is None:
         return Phasing(sheet, None, [()], [], [])
@@ -134,8 +134,9 @@ def study(scenario: Scenario, entry: LawEntry, seen: Seen | None = None) -> Phas
 
 @cache
 def mistakes_of(stage: Stage) -> Array:
-    """Matrices (n, k, k) that a stage's vector (k) may be multiplied by, the identity first: all 48 signed permutations of
-    three axes, alike for each of its vectors; of N units any two exchanges and reversals, and all reversed."""
+    """Return the matrices (n, k, k) by which a mistake may multiply a stage's vector (k,), the identity first: all 48 signed
+    permutations of three axes, the same for each of its vectors; for N units any two exchanges and reversals, and the
+    reversal of all."""
     size = stage.blocks[0].size
     if size == 3:
         signs = product((1.0, -1.0), repeat=3)
@@ -153,8 +154,8 @@ def mistakes_of(stage: Stage) -> Array:
 
 
 def described(matrix: Any, labels: list[str]) -> str:
-    """A signed permutation in words: what is exchanged and then reversed; of three axes as a turn, where it is one about
-    an axis."""
+    """Return a signed permutation in words: the exchanges and then the reversals, or, for three axes, the rotation about an
+    axis, if it is one."""
     order, reversed_ = np.abs(matrix).argmax(axis=1), matrix.sum(axis=1) < 0.0
     words: list[str] = []
     if (order[order] == np.arange(len(order))).all():
@@ -180,7 +181,7 @@ def described(matrix: Any, labels: list[str]) -> str:
 
 
 def explained(sheet: Sheet, values: Sequence[float | str | None]) -> list[tuple[Mistake, ...]]:
-    """The sets of mistakes, at most one a stage and MOST in all, that explain what was seen; those with the fewest."""
+    """Return the smallest sets of mistakes, at most one per stage and MOST in all, that explain the observations."""
     tests = _tests(sheet, values)
     for most in range(MOST + 1):
         if sets := list(_fitting(sheet, tests, most)):
@@ -189,8 +190,9 @@ def explained(sheet: Sheet, values: Sequence[float | str | None]) -> list[tuple[
 
 
 def _fitting(sheet: Sheet, tests: Mapping[tuple[int, int], Sequence[Test]], most: int) -> Iterator[tuple[Mistake, ...]]:
-    """All sets of `most` mistakes that pass the tests, tried at once stage by stage along the loop. For each stimulus a set
-    has the number of a state, which is what the stages before show; the equations are called once for each state."""
+    """Yield all sets of `most` mistakes that pass the tests. All sets are tried together, stage by stage along the loop. For
+    each stimulus a set has the index of a state, the outputs of the previous stages; the equations are called once per
+    state."""
     states: list[list[dict[Stage, Array]]] = [[{}] for _ in sheet.stimuli]
     shown = {cell.at[1] for cell in sheet.cells}
     sets, ids = np.zeros((1, 0), dtype=int), np.zeros((1, len(sheet.stimuli)), dtype=int)
@@ -230,7 +232,7 @@ def _fitting(sheet: Sheet, tests: Mapping[tuple[int, int], Sequence[Test]], most
 
 
 def outputs(stimulus: Stimulus, stage: Stage, before: Mapping[Stage, Array], picks: Any) -> Array:
-    """Tell what a stage shows (n, k) after those before it, with each of the mistakes of these numbers."""
+    """Return the outputs (n, k) of a stage, given those of the stages before it, with each of the mistakes `picks`."""
     vector = stimulus.bench.vectors(stimulus, before)[stage]
     matrices = mistakes_of(stage)[np.asarray(picks)]
     if stage.kind == "torque" and stage.part != ACTUATORS:
@@ -239,7 +241,7 @@ def outputs(stimulus: Stimulus, stage: Stage, before: Mapping[Stage, Array], pic
 
 
 def _left(state: dict[Stage, Array], stage: Stage) -> dict[Stage, Array]:
-    """The part of a state that stages after this one ask for."""
+    """Return the part of a state on which later stages depend."""
     passed = ORDER[: ORDER.index(stage.kind)]
     gone = {
         "reading": lambda one: "reading" in passed and one.blocks[0].name in STATED,
@@ -252,7 +254,7 @@ def _left(state: dict[Stage, Array], stage: Stage) -> dict[Stage, Array]:
 
 
 def _tests(sheet: Sheet, values: Sequence[float | str | None]) -> dict[tuple[int, int], list[Test]]:
-    """For a stimulus and a stage, tests of what vectors (n, k) of the stage agree with what was seen."""
+    """Return, by stimulus and stage, the tests whether output vectors (n, k) agree with the observations."""
     tests: dict[tuple[int, int], list[Test]] = {}
     for (at, (first, last)), cells in _blocks(sheet, values).items():
         expected = max(abs(cell.value) for cell, _ in cells)
@@ -281,7 +283,7 @@ def _tests(sheet: Sheet, values: Sequence[float | str | None]) -> dict[tuple[int
 
 
 def _blocks(sheet: Sheet, values: Sequence[float | str | None]) -> dict[Any, list[tuple[Cell, float | str | None]]]:
-    """The cells of each vector with what was seen."""
+    """Return the cells of each vector with their observations."""
     blocks: dict[Any, list[tuple[Cell, float | str | None]]] = {}
     for cell, value in zip(sheet.cells, values, strict=True):
         blocks.setdefault((cell.at, cell.block), []).append((cell, value))
@@ -289,14 +291,14 @@ def _blocks(sheet: Sheet, values: Sequence[float | str | None]) -> dict[Any, lis
 
 
 def _sizes(sheet: Sheet, values: Sequence[float | str | None]) -> list[str]:
-    """Sentences about vectors of another size than expected."""
+    """Return sentences about vectors of unexpected magnitude."""
     sentences: list[str] = []
     for cells in _blocks(sheet, values).values():
         numbers = [abs(value) for _, value in cells if isinstance(value, float)]
         ratio = max(numbers) / max(abs(cell.value) for cell, _ in cells) if len(numbers) == len(cells) else 1.0
         if not 1.0 / FAR <= ratio <= FAR:
             first = cells[0][0]
-            sentences.append(f"{first.stimulus}, {first.stage}: {ratio:.2g} times the size that is expected.")
+            sentences.append(f"{first.stimulus}, {first.stage}: {ratio:.2g} times the expected magnitude.")
     return sentences
 
 
@@ -306,7 +308,7 @@ KEYS, EXPECTED = ("stimulus", "stage", "axis"), "expected sign"
 
 
 def opened(path: str) -> Seen:
-    """A sheet that was filled in. InputError for a file that is no table with the columns of a sheet."""
+    """Return the completed sheet in a file. InputError for a file that is not a table with the columns of a sheet."""
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
         rows = csv.DictReader(text.splitlines(), strict=True)
@@ -317,11 +319,11 @@ def opened(path: str) -> Seen:
         names = (*KEYS, EXPECTED, SEEN)
         return Seen(path, [(rows.line_num, {name: (row.get(name) or "").strip() for name in names}) for row in rows])
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(path, "", getattr(error, "strerror", None) or str(error), "phasing.csv, filled in") from None
+        raise InputError(path, "", getattr(error, "strerror", None) or str(error), "a completed phasing.csv") from None
 
 
 def filled(sheet: Sheet, seen: Seen) -> list[float | str | None]:
-    """Tell what was seen in each cell of a sheet: a number, a sign, or None. InputError for rows of another sheet."""
+    """Return the observation in each cell of a sheet: a number, a sign, or None. InputError for rows of another sheet."""
     places = {(cell.stimulus, cell.stage, cell.axis): place for place, cell in enumerate(sheet.cells)}
     values: list[float | str | None] = [None] * len(sheet.cells)
     met: set[int] = set()

@@ -1,4 +1,4 @@
-"""The proved pointing bound of a loop, and each source's share of it."""
+"""The proved pointing bound of a loop, and the share of each error source in it."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 Notice: TypeAlias = Callable[[int, int, str], None]
 FOUND = ("level", "highest", "end.angle", "end.rate", "settling")
-"""The numbers of a claim that the search for the others finds."""
+"""The numbers of a claim that the search for the others determines."""
 
 
 @dataclass(frozen=True)
 class ProvedPointing:
-    """The proved bound of a loop's pointing. text: the claim, or why there is none. angle: rad, at all times after
-    `settling` (s); None where nothing is proved. share: of orbits, None for all. left_out: parts outside the claim.
-    starts_inside: whether the scenario starts in the certified set. shares: by how much (rad) the bound is lower without a
-    source; None for one that does not affect the claim, or without which no bound is found.
+    """The proved pointing bound of a loop. text: the claim, or the reason why there is none. angle: the bound (rad) at all
+    times after `settling` (s); None where none is proved. share: the share of orbits for which it holds, None for all.
+    left_out: parts outside the claim. starts_inside: whether the scenario starts in the certified set. shares: the decrease
+    (rad) of the bound without each source; None for a source that the claim ignores, or without which no bound is proved.
     """
 
     text: str
@@ -41,7 +41,7 @@ class ProvedPointing:
 
     @property
     def sentence(self) -> str:
-        """All that is proved, in one sentence."""
+        """The proved bound, or the reason why there is none, in one sentence."""
         if self.angle is None:
             return f"No pointing bound is proved: {self.text}."
         whole = "" if self.left_out else "; no part is left out"
@@ -55,8 +55,8 @@ def prove_pointing(
     others: Mapping[str, Callable[[], ClosedLoop]] | None = None,
     notice: Callable[[str], None] = lambda name: None,
 ) -> ProvedPointing:
-    """Prove how near to its target a loop of a scenario stays. others: by source, a function that makes the loop with all
-    but this source; `notice` is called with the next one."""
+    """Return the proved pointing bound of a loop of a scenario. others: by source, a function that makes the loop without
+    this source; `notice` is called with the next source."""
     from starhold.analysis.departure import start_inside
 
     if loop.nominal is not None:
@@ -86,7 +86,7 @@ def prove_pointing(
 
 
 def budget_with_proof(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, total, name: None) -> Budget:
-    """Return the budget of a law with the proved pointing bound and the share of each source, which take seconds each.
+    """Return the budget of a law with the proved pointing bound and the share of each source; each proof takes seconds.
     `notice` is called with the number done, the total, and the next item."""
     budget, flown = study(scenario, entry, notice), faultless(scenario)
     names = [source.name for source in sources(flown)]
@@ -109,7 +109,7 @@ def _share(claim: Claim, other: Claim) -> float | None:
 
 
 def _told(claim: Claim) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the numbers of a loop that its claim depends on."""
+    """Return the numbers of a loop on which its claim depends."""
     proof: Any = claim.proof
     numbers, programs = proof.claim["numbers"], proof.claim["programs"]
     return {k: x for k, x in numbers.items() if k not in FOUND}, {k: x for k, x in programs.items() if k != "lyapunov"}

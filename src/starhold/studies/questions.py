@@ -1,5 +1,5 @@
-"""Turns the checks of a scenario's numbers into programs of the keys that a page moves: the checks of the craft and the
-start, and each law's own `check` and `remember`, with the texts of their refusals."""
+"""Records the checks of a scenario's numbers as programs of the keys that a page lets the reader change: the checks of craft
+and start, and each law's `check` and `remember`, with the texts of their refusals."""
 
 from collections.abc import Callable, Container, Iterator, Mapping
 from functools import reduce
@@ -23,13 +23,13 @@ MOST = 100
 """The most paths through a check."""
 
 Words = list[str | tuple[int, str]]
-"""The text of a refusal: pieces of text, and numbers as their place among those of the program and their format."""
+"""The text of a refusal: pieces of text, and numbers, each as its index in the program's output and a format."""
 
 
 def record_check(check: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Program, list[tuple[int, Words]]] | None:
-    """Return a program of the floats of the arguments, as from `record_call`, and for each refusal the index of the number
-    that is 1 where it applies, with its text; None where the check never refuses these arguments. RecordingError where the
-    check cannot be recorded."""
+    """Return a check as a program of the floats in its arguments, as from `record_call`, and for each refusal the index of
+    the output that is 1 where it applies, with its text; None where the check never refuses such arguments. RecordingError
+    where the check cannot be recorded."""
     refusals: list[tuple[int, Words]] = []
 
     def ways(*values: Any) -> tuple[Any, ...]:
@@ -68,7 +68,7 @@ def record_check(check: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Prog
 
 
 def _words(text: str, first: int) -> Words:
-    """Return the pieces of a text whose numbers begin at `first`."""
+    """Return the pieces of a text, with its numbers indexed from `first` on."""
     pieces: Words = []
     for turn, piece in enumerate(text.split(MARK)):
         if turn % 2:
@@ -81,12 +81,12 @@ def _words(text: str, first: int) -> Words:
 
 UNASKED = "the law's check of it cannot be recorded"
 NEAR, RANGE = 3.0, 10.0
-"""The largest factors by which inertias, and other numbers, are moved."""
+"""The largest factors by which inertias and other numbers are changed."""
 
 
 class Question(NamedTuple):
-    """A program of the values of these keys, in order; for each refusal the index of the number that is 1 where it applies,
-    with its text; and the law whose check it is, "" for the scenario."""
+    """A check as a program of the values of these keys, in order; for each refusal the index of the output that is 1 where
+    it applies, with its text; and the law whose check it is, "" for the scenario."""
 
     law: str
     keys: tuple[str, ...]
@@ -95,7 +95,7 @@ class Question(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """All checks; keys that cannot be moved, each with the reason; and keys that can be moved only up to a factor, within
+    """All checks; keys that cannot be changed, each with the reason; and keys that can be changed only by a factor, within
     which a law with an unrecorded check was tested."""
 
     questions: tuple[Question, ...]
@@ -104,11 +104,12 @@ class Asked(NamedTuple):
 
 
 def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str, Any], flown: Container[str]) -> Asked:
-    """Return the checks of these keys by a scenario whose laws have these loops, and of which those named fly."""
+    """Return the checks that a scenario applies to the keys `dials`. loops: the laws' loops; flown: the names of the laws
+    that fly."""
     shared = {key: value for key, value in dials.items() if not key.startswith("law.")}
     questions, unasked = _recorded("", lambda values: scenario.hooks.admitted(scenario, values), shared)
     fixed, ranged = dict.fromkeys(unasked, UNASKED), dict[str, float]()
-    # First the checks of all laws as a file is read, then those as loops are built.
+    # First the checks of all laws while a file is read, then those while loops are built.
     built = [entry for entry in scenario.laws if entry.name in flown]
     for entry, reads in [*((entry, True) for entry in scenario.laws), *((entry, False) for entry in built)]:
         check, prefix = _check(scenario, entry, loops[entry.name], reads), f"law.{entry.name}."
@@ -125,8 +126,8 @@ def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str,
 
 
 def _check(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, reads: bool) -> Callable[[Mapping[str, Any]], None]:
-    """Return the checks by a law of its gains and its nominal craft, under values of keys, as its file is read or its memory
-    made."""
+    """Return a law's check of its gains and nominal craft as a function of values of keys: the one applied when its file is
+    read, or when its memory is made."""
 
     def check(values: Mapping[str, Any]) -> None:
         gains_given = {key.rpartition(".")[2]: value for key, value in values.items() if key.startswith("law.")}
@@ -148,7 +149,7 @@ def _check(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, reads: bool) -
 def _recorded(
     law: str, check: Callable[[Mapping[str, Any]], Any], values: Mapping[str, Any]
 ) -> tuple[list[Question], list[str]]:
-    """Return a check as a program, if it checks anything, and the keys that it uses in ways that cannot be recorded."""
+    """Return a check as a program, if it can refuse anything, and the keys whose use in it cannot be recorded."""
 
     def of(keys: tuple[str, ...]) -> list[Question]:
         made = record_check(lambda given: check(dict(zip(keys, given, strict=True))), (tuple(values[key] for key in keys),))
@@ -172,7 +173,7 @@ def _recorded(
 
 
 def _takes(scenario: Scenario, check: Callable[[Mapping[str, Any]], Any], values: Mapping[str, Any]) -> bool:
-    """Return whether a law accepts these values, as it does where no body has them."""
+    """Return whether a law accepts these values; impossible ones, which the scenario refuses, count as accepted."""
     try:
         scenario.hooks.admitted(scenario, values)
     except InputError:
@@ -185,7 +186,7 @@ def _takes(scenario: Scenario, check: Callable[[Mapping[str, Any]], Any], values
 
 
 def _corners(value: Any, factor: float) -> Iterator[Any]:
-    """Return a number multiplied and divided by the factor; an inertia with each axis scaled so."""
+    """Yield a number multiplied and divided by the factor; for an inertia, with each axis scaled by it."""
     if not isinstance(value, tuple):
         yield from (value / factor, value * factor)
         return

@@ -1,5 +1,5 @@
-"""A scenario that flies again elsewhere with other numbers: each law's loop as a program, and the equations that give its
-numbers from values of the file's keys. A key whose effects no equation gives, such as a law's matrices, cannot be moved.
+"""Programs with which a scenario flies again elsewhere with other numbers: each law's loop, and the equations that compute
+its numbers from values of the file's keys. A key whose effect no equation gives, as on a law's matrices, cannot be changed.
 """
 
 from __future__ import annotations
@@ -40,24 +40,24 @@ Values: TypeAlias = dict[str, Any]
 
 FAULTS = "faults change the loop in flight"
 SUPPOSED = "its nominal model is not the craft that flies"
-MODES = "its modes have gains of their own, which the page does not move"
+MODES = "its modes have their own gains, which the page cannot change"
 COMPUTED = "it affects numbers that no recorded equation gives, such as a law's matrices"
-ALONE = "no value beside the file's own is allowed"
+ALONE = "no other value than the file's is allowed"
 TRIED = ((1.05, 0.97, 1.02), (1.02, 1.02, 1.02), (0.9, 0.9, 0.9))
-"""Factors by which components are changed to see their effects; the first that the scenario accepts is used."""
+"""Factors by which components are changed to determine their effects; the first that the scenario accepts is used."""
 NUDGE = 1e-3
-"""The value that replaces a zero there."""
+"""The value that replaces a zero for this."""
 
 
 @dataclass(frozen=True)
 class Reflown:
     """One law's loop, to be flown elsewhere.
 
-    program: `fly` as `kernels.one` records it; derive: computes the numbers at `places` among those of the carry and, after
-    them, of the shared arguments, from the values of the keys `follows`, in order; numbers, tables: all of the scenario;
-    unfollowed: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: the recorded
-    quantities with their numbers of components; reads: the numbers of the nominal model that the law uses, "inertia" or
-    "torque_limit"."""
+    program: `fly` as recorded by `kernels.one`; derive: computes, from the values of the keys `follows` in order, the
+    numbers at `places`, indices in the carry followed by the shared arguments; numbers, tables: those of the scenario;
+    unfollowed: the reasons why other keys are not followed; every, steps, seed, run, period: as for `fly`; columns: the
+    recorded quantities with their numbers of components; reads: the numbers of the nominal model that the law uses,
+    "inertia" or "torque_limit"."""
 
     name: str
     program: Program
@@ -79,8 +79,8 @@ class Reflown:
 
 @dataclass(frozen=True)
 class Reflight:
-    """A scenario to be flown again: keys that can be moved, with their numbers; the laws; why a law cannot fly again; and
-    the file, with blanks for the keys' values, see `pieces`."""
+    """A scenario to be flown again: the keys that can be changed, with their values; the laws; the reasons why other laws
+    cannot fly again; and the file, with blanks for the keys' values, see `pieces`."""
 
     scenario: Scenario
     dials: Values
@@ -91,12 +91,12 @@ class Reflight:
     checks: Asked
 
     def changed(self, values: Mapping[str, Any]) -> Scenario:
-        """Return the scenario with these values at keys of `dials`, as in the page's file."""
+        """Return the scenario with these values of keys of `dials`, as in the file that the page writes."""
         return changed(self.scenario, _changes(self.scenario, values))
 
 
 class Piece(NamedTuple):
-    """A piece of a file: a text, or the value of a key. `only`: the piece is left out unless this key is moved."""
+    """A piece of a file: a text, or the value of a key. `only`: a key; unless it is changed, the piece is left out."""
 
     text: str = ""
     key: str = ""
@@ -104,8 +104,8 @@ class Piece(NamedTuple):
 
 
 def reflight(scenario: Scenario, laws: Collection[str] | None = None) -> Reflight:
-    """Make the programs that fly the laws of these names again, or all laws; the scenario is read with all of them. Designed
-    gains stay as they are: the scenario has them as numbers."""
+    """Return the programs that fly the laws of these names, or all laws, again. Designed gains keep their values, which the
+    scenario then states as numbers."""
     explicit = _explicit(scenario)
     dials = dict(explicit.hooks.dials(explicit))
     shared = list(dials)
@@ -119,7 +119,7 @@ def reflight(scenario: Scenario, laws: Collection[str] | None = None) -> Refligh
             if _is_numbers(value) and not item.gain.whole and not item.gain.choices:
                 key = f"law.{entry.name}.{item.name}"
                 dials[key], gains[key] = value, item
-    # An attitude given by angles is moved as a quaternion.
+    # An attitude given by angles is changed as a quaternion.
     explicit = changed(explicit, _changes(explicit, {key: dials[key] for key in shared if key == "initial.attitude"}))
     tried = _Tried(explicit, dials)
     reflown: list[Reflown] = []
@@ -169,20 +169,20 @@ def _explicit(scenario: Scenario) -> Scenario:
 
 
 def _changes(scenario: Scenario, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the changes of the file that give dials these values."""
+    """Return the changes of the file that set dials to these values."""
     of_law = {key: value for key, value in values.items() if key.startswith("law.")}
     return scenario.hooks.changes({key: value for key, value in values.items() if key not in of_law}) | of_law
 
 
 class _Tried:
-    """Scenarios with other values of some keys, read once for all laws."""
+    """Scenarios with other values of some keys, each read once for all laws."""
 
     def __init__(self, scenario: Scenario, dials: Values) -> None:
         self.scenario, self.dials = scenario, dials
         self._known: dict[tuple[str, ...], tuple[Values, Scenario] | None] = {}
 
     def of(self, first: str, *more: str) -> tuple[Values, Scenario] | None:
-        """Return other values of these keys, each allowed by itself, with the scenario that has them; None where no other is
+        """Return other values of these keys, each allowed on its own, and the scenario with them; None where no other is
         allowed."""
         keys = (first, *more)
         if keys not in self._known:
@@ -215,14 +215,14 @@ def _reflown(
     flat = Flat.of(loop, steps, entered=True)
 
     def follows(*keys: str) -> bool:
-        """Return whether the equation of all kept keys gives the numbers of a scenario in which these are moved."""
+        """Return whether the equation of all kept keys gives the numbers of a scenario in which these keys are changed."""
         if (other_values := tried.of(*keys)) is None:
             return False
         values, other = other_values
         try:
             # Not flown for a step, as `build` does: only its numbers are needed.
             made = other.hooks.build(other, other.pick(entry.name))
-            # A key that follows another has its value, unless it is moved itself.
+            # A key that follows another has its value, unless it is changed itself.
             along = {key: values[leader] for key, leader in scenario.hooks.linked.items() if leader in values}
             given = {key: (by_key | along | values)[key] for key in kept}
             return flat.gives(Flat.of(made, steps, entered=True), _given(scenario, loop, given))
@@ -230,7 +230,7 @@ def _reflown(
             return False
 
     unfollowed: dict[str, str] = {}
-    # With all keys given at their values, the start must be the file's own.
+    # With all keys at their values, the start must be that of the file.
     kept = [key for key in by_key if not key.startswith("law.")]
     kept = kept if flat.gives(flat, _given(scenario, loop, {key: by_key[key] for key in kept})) else []
     unfollowed |= {key: COMPUTED for key in by_key if not key.startswith("law.") and key not in kept}
@@ -238,7 +238,7 @@ def _reflown(
     unfollowed |= {key: fixed[key] for key in kept if key in fixed}
     unfollowed |= {key: ALONE for key in kept if key not in unfollowed and not tried.of(key)}
     kept = [key for key in kept if key not in unfollowed]
-    # All at once, and those alone that others follow; one by one only where that fails.
+    # All keys at once, and separately those that others follow; one by one only where this fails.
     if kept and not (follows(*kept) and all(follows(key) for key in scenario.hooks.linked.values() if key in kept)):
         unfollowed |= {key: COMPUTED for key in kept if not follows(key)}
         kept = [key for key in kept if key not in unfollowed]
@@ -297,7 +297,7 @@ def _given(scenario: Scenario, loop: ClosedLoop, values: Values) -> list[Any]:
 
 
 def _recorded(scenario: Scenario, loop: ClosedLoop, by_key: Values) -> tuple[Program, tuple[int, ...]]:
-    """Return the equation as a program that gives only the numbers that depend on the values, and their indices."""
+    """Return the equation as a program for only those numbers that depend on the values, and their indices."""
     equation, places = _equation(scenario, loop, list(by_key)), list[int]()
 
     def depending(values: Any) -> tuple[Any, ...]:
@@ -329,7 +329,7 @@ MARK = "\ue000"
 
 
 def _pieces(scenario: Scenario, dials: Values) -> Iterator[Piece]:
-    """Return the scenario as a file with blanks for the values at the keys of the dials."""
+    """Yield the scenario's file in pieces, with blanks for the values of the keys `dials`."""
     tables = read_toml(scenario.text, scenario.where)
     last: list[str] = []
     for key in dials:

@@ -1,4 +1,4 @@
-"""Recorded sensor data are replayed: what a scenario's estimator and law make of them, compared with what was recorded."""
+"""Replays recorded sensor data through a scenario's estimator and law, and compares the results with the recorded ones."""
 
 from __future__ import annotations
 
@@ -24,18 +24,17 @@ from starhold.studies.telemetry import Telemetry, read
 from starhold.studies.telemetry_files import LABELS, Array
 
 SIGMAS = 3.0
-"""Deviations beyond which an estimate is another one."""
+"""The number of standard deviations beyond which two estimates count as different."""
 TOLERANCE = 0.01
-"""Share of the largest recorded value beyond which a quantity without a known deviation is another one."""
+"""The share of the largest recorded value beyond which values without a known standard deviation count as different."""
 ROUNDING = 1e-9
-"""Share of the largest recorded value up to which a difference is rounding."""
+"""The share of the largest recorded value up to which a difference counts as rounding."""
 
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
-    """A computed quantity with the recorded one, at the times (n,) in s at which that was recorded: both (n, k), and of each
-    sample the size of the difference and the one that is allowed, (n,), in the quantity's unit, as angles (rad) for
-    attitudes."""
+    """A computed and a recorded quantity, both (n, k), at the recorded times (n,; s), with the magnitude of their difference
+    and the allowed difference, both (n,), in the quantity's unit; for attitudes these are angles (rad)."""
 
     name: str
     against: str
@@ -49,17 +48,17 @@ class Comparison:
 
     @property
     def beyond(self) -> NDArray[np.bool_]:
-        """Whether each sample differs by more than is allowed, (n,)."""
+        """A mask (n,) of the samples that differ by more than allowed."""
         return ~(self.difference <= self.allowed)
 
     @property
     def parted_at(self) -> float | None:
-        """When they first differ by more than is allowed (s); None where they never do."""
+        """The first time (s) at which they differ by more than allowed, or None."""
         return float(self.times[self.beyond.argmax()]) if self.beyond.any() else None
 
     @property
     def same_bits(self) -> bool:
-        """Whether all numbers are equal, bit for bit."""
+        """Whether all numbers are equal bit for bit."""
         return bool(np.array_equal(self.computed, self.recorded))
 
     def __repr__(self) -> str:
@@ -68,8 +67,8 @@ class Comparison:
 
 @dataclass(frozen=True, repr=False)
 class Replay:
-    """A replay gives the recording of what was computed, a sample each control step, comparisons, and sentences about what
-    the telemetry lacks."""
+    """The result of a replay: the recording of the computed quantities, with a sample per control step, the comparisons, and
+    sentences about gaps in the telemetry."""
 
     telemetry: Telemetry
     run: Recording
@@ -81,13 +80,13 @@ class Replay:
 
     @property
     def parted(self) -> Comparison | None:
-        """The comparison that parts first; None where none does."""
+        """The comparison that first exceeds the allowed difference, or None."""
         parted = [one for one in self.comparisons if one.parted_at is not None]
         return min(parted, key=lambda one: one.parted_at or 0.0, default=None)
 
     @property
     def sentence(self) -> str:
-        """Where estimates and commands first part from what was recorded."""
+        """A sentence on when estimates and commands first differ from the recorded ones."""
         first = self.parted
         if not self.comparisons:
             return "Nothing that the scenario computes was recorded: there is nothing to compare with."
@@ -103,7 +102,7 @@ class Replay:
 
 
 def tolerance_of(text: str | float) -> float:
-    """The tolerance that an option states. InputError for anything but a number above 0."""
+    """Return the tolerance that an option states. InputError unless it is a number above 0."""
     number = number_in(str(text))
     if number is None or not 0.0 < number < math.inf:
         raise InputError("replay", "tolerance", str(text), "a share such as 0.01")
@@ -111,9 +110,9 @@ def tolerance_of(text: str | float) -> float:
 
 
 def study(scenario: Scenario, entry: LawEntry, source: Any, mapping: Any = None, tolerance: float | None = None) -> Replay:
-    """The replay of telemetry by a law of a scenario. source, mapping: as `telemetry.read` takes them; tolerance: the share
-    of the largest recorded value by which quantities may differ whose deviation is not known. InputError where readings are
-    missing."""
+    """Return the replay of telemetry through a law of a scenario. source, mapping: as in `telemetry.read`; tolerance: the
+    share of the largest recorded value by which quantities without a known standard deviation may differ. InputError where
+    readings are missing."""
     loop = build(scenario, entry)
     telemetry = read(scenario, loop, source, mapping)
     duration = scenario.table.simulation.steps
@@ -135,7 +134,7 @@ def study(scenario: Scenario, entry: LawEntry, source: Any, mapping: Any = None,
 
 
 def _given(loop: ClosedLoop, values: dict[str, Array], telemetry: Telemetry, first: int) -> tuple[Array, list[str]]:
-    """The rows that `replay` takes, and sentences about what they lack."""
+    """Return the rows that `replay` takes, and sentences about gaps in them."""
     like, count = given_like(loop), len(next(iter(values.values())))
     readings, gaps = _readings(loop, like.readings, values, telemetry)
 
@@ -146,7 +145,7 @@ def _given(loop: ClosedLoop, values: dict[str, Array], telemetry: Telemetry, fir
     fields = [name for name in like.state._fields if name != loop.body.module.COMMAND]
     needed = [name for name in (fields[:2] if not readings else []) if name not in values]
     if needed:
-        raise InputError(telemetry.name, "", f"no {listed(needed)}", "what the law knows: this scenario has no sensors")
+        raise InputError(telemetry.name, "", f"no {listed(needed)}", "the inputs of the law: this scenario has no sensors")
     known = {name: part(getattr(like.state, name), name if name in fields else "") for name in like.state._fields}
     state = like.state._replace(**known)
     if first and "position" in fields and "position" not in values:
@@ -165,20 +164,22 @@ def _given(loop: ClosedLoop, values: dict[str, Array], telemetry: Telemetry, fir
     lacking = [name for name in taken if name in values and np.isnan(values[name]).any()]
     absent = [name for name in taken if name not in values]
     every = f"{count} control steps, every {loop.period:g} s"
-    notes = [f"{listed(gaps)} of {every}; between them none is new, and rates go along straight lines." if gaps else ""]
+    notes = [f"{listed(gaps)} of {every}; between them none is new, and rates are interpolated linearly." if gaps else ""]
     notes += [f"Not recorded, and taken from the estimate or the model: {listed(absent)}." if absent else ""]
-    notes += [f"Recorded at some control steps alone, and so at the others: {listed(lacking)}." if lacking else ""]
+    notes += [
+        f"Recorded at some control steps, at others taken from estimate or model: {listed(lacking)}." if lacking else ""
+    ]
     return rows, [note for note in notes if note]
 
 
 def _whole(numbers: Array) -> NDArray[np.bool_]:
-    """Which rows have all of their numbers, (n,)."""
+    """Return a mask (n,) of the rows without missing numbers."""
     return np.asarray(np.isfinite(numbers).all(axis=1))
 
 
 def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], telemetry: Telemetry) -> tuple[Any, list[str]]:
-    """The readings of all sensors at each control step, and how often there is one: where there is none, that of a sensor
-    that tells whether it is new is not, and any other lies on a straight line between those around it."""
+    """Return the readings of all sensors at each control step, and sentences on how often each is recorded. A missing
+    reading is marked as not new if its sensor has such a flag, and else interpolated linearly."""
     sensors = [fitted.called.replace("-", "_") for fitted in loop.used("sensor")]
     wanted = {f"{s}_{n}": n for s, reading in zip(sensors, like, strict=True) for n in reading._fields}
     flags = {name for name, field in wanted.items() if "_is_" in field}
@@ -192,11 +193,11 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], telemetry: 
             continue
         there = _whole(values[name])
         if not there.any():
-            raise InputError(telemetry.name, name, "no number within the scenario", "a reading at least")
+            raise InputError(telemetry.name, name, "no number within the scenario", "at least one reading")
         steps, places = np.arange(len(there)), np.flatnonzero(there)
         marks = [flag for flag in flags if flag.startswith(f"{name}_is_")]
         if marks or values[name].shape[1] == len(LABELS["quaternion"]):
-            # An estimator passes over a reading that is not new.
+            # An estimator ignores a reading that is not new.
             filled[name] = values[name][np.maximum.accumulate(np.where(there, steps, places[0]))]
         else:
             filled[name] = np.stack([np.interp(steps, places, column[places]) for column in values[name].T], axis=1)
@@ -215,7 +216,7 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], telemetry: 
 
 
 def _effector_names(loop: ClosedLoop) -> dict[tuple[int, str], str]:
-    """The recorded name of each number of an effector's state that is carried from one control step to the next."""
+    """Return the recorded name of each number of an effector's state that is carried from one control step to the next."""
     names = [name for name, _, _ in recorded(loop)][len(loop.body.module.Sample._fields) :]
     matched: dict[tuple[int, str], str] = {}
     for place, (fitted, inner) in enumerate(zip(loop.used("effector"), loop.carry().effectors, strict=True)):
@@ -231,17 +232,17 @@ def _effector_names(loop: ClosedLoop) -> dict[tuple[int, str], str]:
 
 
 def _comparisons(loop: ClosedLoop, run: Recording, values: dict[str, Array], share: float) -> Iterator[Comparison]:
-    """All that is computed and was recorded, side by side."""
+    """Yield the comparisons of all quantities that are both computed and recorded."""
     estimators = [fitted.called.replace("-", "_") for fitted in loop.used("estimator")]
     sensors = tuple(f"{fitted.called.replace('-', '_')}_" for fitted in loop.used("sensor"))
     given = {*loop.body.module.Sample._fields, *_effector_names(loop).values()} - {"command"}
     passed = (*sensors, *(f"{name}_deviation" for name in run.columns))
     pairs = [(n, n) for n in run.columns if n in values and n not in given and not n.startswith(passed)]
     for one in estimators:
-        # What the satellite itself took its attitude and rate for.
+        # The satellite's own estimates of its attitude and rate.
         if not any(name.startswith(f"{one}_") for name in values):
             pairs = [(f"{one}_{n}", n) for n in ("attitude", "rate") if n in values] + pairs
-    # Causes stand before what they cause.
+    # Causes come before their effects.
     pairs.sort(key=lambda pair: not pair[0].startswith(tuple(f"{one}_" for one in estimators)))
     for name, against in pairs:
         there = _whole(values[against])
@@ -258,14 +259,14 @@ def _comparisons(loop: ClosedLoop, run: Recording, values: dict[str, Array], sha
 
 
 def _angles(computed: Array, seen: Array) -> Array:
-    """The angles (n,) between attitudes (n, 4), in rad; 0 between equal ones."""
+    """Return the angles (n,) between attitudes (n, 4), in rad; exactly 0 between equal ones."""
     turn: Any = relative(tuple(seen.T), tuple(computed.T))  # type: ignore[arg-type]
     angles = 2.0 * np.arctan2(np.linalg.norm(turn[1:], axis=0), np.abs(turn[0]))
     return np.where((computed == seen).all(axis=1), 0.0, angles)
 
 
 def _deviation(loop: ClosedLoop, run: Recording, name: str) -> Array | None:
-    """The standard deviation (n,) of an estimate: the one that the estimator reports, else that of the sensors' noise."""
+    """Return the standard deviation (n,) of an estimate: that reported by the estimator, else that of the sensors' noise."""
     if f"{name}_deviation" in run.columns:
         return np.linalg.norm(run[f"{name}_deviation"], axis=1)
     prefix, _, field = name.rpartition("_")

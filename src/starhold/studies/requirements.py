@@ -1,4 +1,4 @@
-"""Requirements as numbers: bounds of metrics, each with its margin."""
+"""Requirements as numbers: bounds on metrics, with their margins."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 ORBITS = re.compile(r"([0-9]+(?:\.[0-9]+)?) ?orbits?")
-"""A time in orbits of the flight."""
+"""Matches a time in orbits of the flight."""
 LOST = "lost"
-"""Beside metrics and the exclusion-cone it may be required that the motion does not diverge."""
+"""The name, beside metrics and the exclusion-cone, of the requirement that the motion does not diverge."""
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """A bound of a metric, in its unit (SI), that a `share` of the flights must keep, shown with a `confidence`. column: the
-    name of the measured metric; at_most: whether the bound is the largest or the least value allowed."""
+    """A bound on a metric, in its unit (SI), that a `share` of the flights must meet, shown with a `confidence`. column: the
+    name of the measured metric; at_most: whether the bound is the largest value allowed, not the least."""
 
     name: str
     metric: str
@@ -44,8 +44,8 @@ class Requirement:
     confidence: float
 
     def margins(self, metrics: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Return the margin of each run, in the metric's unit: 0 or more where it keeps the bound, minus infinity where it
-        has no such value. For a motion that was not lost it is 1."""
+        """Return the margin (n,) of each run, in the metric's unit: 0 or more where it meets the bound, minus infinity where
+        it has no such value. For the requirement "not lost" it is 1 or minus infinity."""
         if self.metric == LOST:
             return np.where(np.isnan(metrics["diverged_at"]), 1.0, -np.inf)
         values = metrics[self.column]
@@ -59,13 +59,13 @@ class Requirement:
 
 
 def cones_of(tables: Iterable[RequirementTable]) -> dict[str, Cone]:
-    """Return the cones of requirements, by the names of their metrics; axes and directions have unit length."""
+    """Return the exclusion cones of requirements, by the names of their metrics; axes and directions have unit length."""
     cones = [table for table in tables if table.metric == CONE]
     return {column_of(table): Cone(_unit(table.axis), _unit(table.direction)) for table in cones}
 
 
 def extras_of(tables: Iterable[RequirementTable], more: Sequence[str]) -> tuple[str, ...]:
-    """Return the metrics, or kinds of them, to be measured beyond the usual: those requested, and those required."""
+    """Return the additional metrics, or kinds of metrics, to measure: those requested and those required."""
     wanted = {
         *more,
         *(extra for table in tables for extra in EXTRAS if extra in str(table.metric) and not is_of_a_part(table)),
@@ -82,9 +82,9 @@ def tables_of(scenario: Scenario, method: str | None) -> dict[str, RequirementTa
 def read_requirements(
     tables: Mapping[str, RequirementTable], units: Mapping[str, str], where: str, orbit: float | None = None
 ) -> tuple[Requirement, ...]:
-    """The requirements of tables, which errors call by their keys; units: those of the metrics that the method measures;
-    orbit: how long (s) an orbit of the flight takes, of which times may be multiples.
-    InputError where one asks for what is not measured, or for no bound."""
+    """Return the requirements of tables, given by their names in errors; units: those of the metrics that the method
+    measures; orbit: the orbital period (s), of which times may be multiples. InputError where a metric is not measured or a
+    bound is missing."""
     beside = [LOST, CONE, BEGINS] if {table.method for table in tables.values()} <= {"campaign", "flight"} else []
     requirements: list[Requirement] = []
     for key, table in tables.items():
@@ -107,7 +107,7 @@ def read_requirements(
 
 
 def at_most(scenario: Scenario, tables: Mapping[str, RequirementTable], units: Mapping[str, str]) -> tuple[Requirement, ...]:
-    """Return the requirements of methods that only bound metrics from above, as `read_requirements` does."""
+    """Return the requirements of a method that bounds metrics only from above, as `read_requirements` does."""
     for key, table in tables.items():
         if table.at_least is not None:
             raise InputError(scenario.where, f"{key}.at_least", show(table.at_least), f"at_most, with a {table.method}")
@@ -115,7 +115,7 @@ def at_most(scenario: Scenario, tables: Mapping[str, RequirementTable], units: M
 
 
 class Times(NamedTuple):
-    """The times (s) between which something is required, since the flight or the mode began."""
+    """The times (s) between which a requirement applies, since the start of the flight or of the mode."""
 
     begin: float = 0.0
     end: float = math.inf
@@ -127,7 +127,7 @@ class Times(NamedTuple):
 
 
 def times_of(scenario: Scenario, key: str, table: RequirementTable, duration: float = math.inf) -> Times:
-    """Return the times of a requirement. InputError where they are invalid, or outside a flight of this duration (s)."""
+    """Return the times of a requirement. InputError where they are invalid or outside a flight of this duration (s)."""
 
     def seconds(name: str, value: Any) -> float:
         try:
@@ -151,7 +151,7 @@ def times_of(scenario: Scenario, key: str, table: RequirementTable, duration: fl
 
 
 def orbit_of(scenario: Scenario) -> float | None:
-    """How long (s) an orbit of a scenario takes; None without one that comes back."""
+    """Return the orbital period (s) of a scenario; None without a closed orbit."""
     orbit = getattr(scenario.table, "orbit", None)
     if orbit is None:
         return None

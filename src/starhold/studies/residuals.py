@@ -1,4 +1,4 @@
-"""Residuals of readings in deviations of the noise that their sensors state, and whether they are white."""
+"""Residuals of readings, in standard deviations of the noise that their sensors state, and a test of their whiteness."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from starhold.parts.random import RANGE, Dice
 from starhold.studies.fitting import Array, Prediction, Reading
 
 SINGULAR = 1e-9
-"""Eigenvalues of a noise's covariance below this share of the largest are 0, as along a direction that is a unit vector."""
+"""Eigenvalues of a noise covariance below this share of the largest count as 0, as along the direction of a unit vector."""
 LAGS = 20
-"""Lags of the test of Ljung and Box."""
+"""The number of lags in the test of Ljung and Box."""
 TURNS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.6, 0.8, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0))
-"""The attitudes in which a sensor is tried that sees nothing at the start."""
+"""The attitudes in which a sensor without a valid reading at the start is tried."""
 
 
 class Noise(NamedTuple):
-    """The noise of a reading: the matrix that makes residuals of unit variance, the degrees of freedom that a row has, and
-    whether more noise accumulates in the sensor's memory."""
+    """The noise of a reading: the matrix that scales residuals to unit variance, the degrees of freedom of a row, and
+    whether further noise accumulates in the sensor's memory."""
 
     whiten: Array
     degrees: int
@@ -33,9 +33,9 @@ class Noise(NamedTuple):
 
 
 class Weighed(NamedTuple):
-    """A reading with what it was at some times: its rows, (n, size), the times in control periods, (n,), the instants that a
-    prediction there is made of with their weights, (n, k), and the matrix that makes residuals of unit variance; degrees:
-    those that a row has of freedom."""
+    """The recorded rows (n, size) of a reading, their times (n,) in control periods, the instants and weights (n, k) with
+    which predictions are interpolated to these times, and the matrix that scales residuals to unit variance; degrees: the
+    degrees of freedom of a row."""
 
     reading: Reading
     rows: Array
@@ -47,8 +47,8 @@ class Weighed(NamedTuple):
 
     @classmethod
     def of(cls, reading: Reading, rows: Array, times: Array, steps: int, noise: Noise) -> Weighed:
-        """A reading at times within `steps` control steps: predictions between instants are those of a cubic through
-        four."""
+        """Return a reading at times within `steps` control steps; predictions between instants are interpolated by a cubic
+        through four of them."""
         count = 1 if (times == np.round(times)).all() else min(4, steps + 1)
         first = np.clip(np.floor(times).astype(int) - (count - 1) // 2, 0, steps + 1 - count)
         off = times - first
@@ -57,11 +57,12 @@ class Weighed(NamedTuple):
         return cls(reading, rows, times, first[:, None] + np.arange(count), weights, noise.whiten, noise.degrees)
 
     def at(self, rows: Array) -> Array:
-        """Rows at the times, (n, ...), of those at all instants."""
+        """Return the rows (n, ...) interpolated to the times, from the rows at all instants."""
         return np.einsum("nk,nk...->n...", self.weights, rows[self.instants])
 
     def residuals(self, given: Prediction) -> tuple[Array, Array]:
-        """Residuals (n, size) in deviations, and their slopes (n, size, free + 1); 0 where the flight reads nothing new."""
+        """Return residuals (n, size) in standard deviations and their slopes (n, size, free + 1); 0 where the predicted
+        flight has no new reading."""
         values, slopes = self._residuals(given)
         for _, gate in self.reading.gates:
             seen = ((given.values[self.instants, gate] > 0.5) | (self.weights == 0.0)).all(axis=1)
@@ -80,8 +81,8 @@ class Weighed(NamedTuple):
 
 
 def ljung_box(values: Array) -> float:
-    """The p-value of the hypothesis that numbers (n,) in order are not correlated, by G. M. Ljung and G. E. P. Box,
-    Biometrika 65 (1978); 1 for too few."""
+    """Return the p-value of the hypothesis that a series (n,) is uncorrelated (G. M. Ljung and G. E. P. Box, Biometrika 65,
+    1978); 1 for too few numbers."""
     count = len(values)
     lags = min(LAGS, count // 5)
     spread = values - values.mean() if count else values
@@ -99,7 +100,7 @@ def conjugates(quaternions: Array) -> Array:
 
 
 class _Varied(Dice):
-    """Random numbers that are 0 and vary, to see how noise enters a reading."""
+    """Random numbers with the value 0 and a derivative, to determine how noise enters a reading."""
 
     def __init__(self) -> None:
         super().__init__((0, 0), 0, 0)
@@ -109,9 +110,9 @@ class _Varied(Dice):
 
 
 def noise_of(loop: ClosedLoop, reading: Reading) -> Noise | None:
-    """The noise that the sensor of a reading states; None for none."""
+    """Return the noise that the sensor of a reading states, or None."""
     setup, carry = loop.setup(), loop.carry()
-    # A sensor that sees nothing there shows no noise: it is tried in other attitudes, and on the other side.
+    # A sensor without a valid reading shows no noise: it is tried in other attitudes, and on the other side.
     for turn, side in product(TURNS, (1.0, -1.0)):
         attitude = multiply(carry.state.attitude, turn)
         state = carry.state._replace(attitude=attitude, position=tuple(side * x for x in carry.state.position))

@@ -1,4 +1,4 @@
-"""A scenario's plant is served to flight software, and what it flew is kept."""
+"""Serves a scenario's plant to flight software and keeps the flight."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Served:
-    """A flight that flight software commanded: its plant, with all counts, and the signal that ended it (0 for none)."""
+    """A flight commanded by flight software: its plant, with all counts, and the signal that ended it (0 for none)."""
 
     scenario: Scenario
     plant: Plant
@@ -29,21 +29,22 @@ class Served:
 
     @property
     def ending(self) -> Ending:
-        """Why it ended."""
+        """The reason why the flight ended."""
         assert self.plant.ending is not None
         return self.plant.ending
 
     @property
     def lines(self) -> list[str]:
-        """Sentences that tell how it went."""
+        """Sentences that describe the flight."""
         from starhold.link.plant import summary
 
         return summary(self.plant)
 
     @property
     def timing(self) -> dict[str, Any] | None:
-        """How well real time was kept, in seconds of the clock: the period, of each command its latency from the readings,
-        of each period how late the plant began it, and how many periods had no command; None in lockstep."""
+        """The timing in real time, in seconds of the clock: the period, the latency of each command from the
+        readings, the delay with which the plant began each period, and the number of periods without a command; None in
+        lockstep."""
         plant, rate = self.plant, self.plant.rules.rate
         if rate is None:
             return None
@@ -53,8 +54,8 @@ class Served:
 
     @cached_property
     def recording(self) -> Recording:
-        """The flight since the last reset, as `simulate` records it, but for the program of the law, which nobody knows. Of
-        one in real time an attribute says what flew a period without a command."""
+        """The flight since the last reset, as `simulate` records it, except the law's program, which is unknown. For
+        real time an attribute states the command in periods without one."""
         flight, every, rules = self.plant.flight, self.scenario.table.simulation.record_every, self.plant.rules
         run = commanded_by("a peer", name_samples(self.scenario, flight.loop, *flight.samples(every)))
         return run if rules.rate is None else replace(run, attrs=run.attrs | {"without_command": rules.missing.value})
@@ -77,12 +78,13 @@ def serve(
     watch: Callable[[Plant], None] | None = None,
 ) -> Served:
     """Serve a scenario's plant on TCP, UDP, ZeroMQ or a serial line to flight software that commands it, until its flight
-    ends: see docs/in-the-loop.md for the messages. `recording` of the result is the flight, `lines` tell how it went.
+    ends: see docs/in-the-loop.md for the messages. `recording` of the result is the flight, `lines` describe it.
 
-    law: whose measurement readings have, the first if None; port: 0 for any that is free; zmq: extra `zmq`; serial: a device
-    such as "/dev/ttyUSB0", extra `serial`, with its baud rate; rate: how many times faster than the clock, None for
-    lockstep; missing: "hold", "zero" or "stop", for a period of real time without a command; announce: called with the
-    address; watch: called with the plant at most once a second of real time. InputError for what cannot be."""
+    law: the law whose measurement the readings contain, by default the first; port: 0 for any free one; zmq: needs the extra
+    `zmq`; serial: a device such as "/dev/ttyUSB0", needs the extra `serial`; baud: its rate; rate: speed relative to the
+    clock, None for lockstep; missing: "hold", "zero" or "stop", for a period of real time without a command; announce:
+    called with the address; watch: called with the plant at most once per second of real time. InputError for impossible
+    arguments."""
     from starhold.link import server
     from starhold.link.plant import Missing, Plant, Rules
     from starhold.link.serial_line import serial_line

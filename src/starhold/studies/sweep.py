@@ -1,4 +1,4 @@
-"""Flies a scenario with many values of some of its keys, and measures each run."""
+"""Flies a scenario with many values of some of its keys and measures each run."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def sweep(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> DataFrame:
-    """Fly a scenario with other values and measure each run: a row each, with the changed keys, `law` and the `metrics`.
+    """Fly a scenario with other values and return a row per run, with the changed keys, `law` and the `metrics`.
 
-    changes: for some keys their values, {"law.pd.k_rate": [0.1, 0.2], "spacecraft.inertia": [...]}, of which every
-    combination is flown; or a list of changes as a scenario's `with_` takes them. law: the one that flies; if None those
-    that the keys name, else all. Each row is what `compare` measures of the changed scenario, but for the cost of calls;
-    nothing is certified. Runs that differ only in numbers fly side by side on the lanes of a vector. InputError before the
-    first flight where one of the scenarios cannot be."""
+    changes: the values of some keys, {"law.pd.k_rate": [0.1, 0.2], "spacecraft.inertia": [...]}, of which every combination
+    is flown; or a list of changes as for a scenario's `with_`. law: the law that flies; by default those that the keys name,
+    else all. The metrics are those that `compare` measures in the changed scenario, without the cost of calls; nothing is
+    certified. Runs that differ only in numbers fly side by side on the lanes of a vector. InputError before the first flight
+    where one of the scenarios is invalid."""
     opened = open_scenario(scenario)
     points = _points(opened, changes)
     names = [law] if law is not None else _named(opened, points)
@@ -59,7 +59,7 @@ def sweep(
 
 
 def _points(scenario: Scenario, changes: Any) -> list[dict[str, Any]]:
-    """Return the list of changes: as given, or every combination of the values of each key."""
+    """Return the list of changes: the given list, or every combination of the values of the keys."""
     if isinstance(changes, Mapping):
         columns = {key: _values(scenario, key, values) for key, values in changes.items()}
         points = [dict(zip(columns, chosen, strict=True)) for chosen in product(*columns.values())]
@@ -78,7 +78,7 @@ def _values(scenario: Scenario, key: str, values: Any) -> list[Any]:
 
 
 def _named(scenario: Scenario, points: list[dict[str, Any]]) -> list[str]:
-    """Return the laws that the changes name; all where they name none, or name laws by index."""
+    """Return the names of the laws in the changes; those of all laws where they name none, or name laws by index."""
     keys = {key for point in points for key in point if key.startswith("law")}
     names = [entry.name for entry in scenario.laws]
     about = [name for name in names if any(f"{key}.".startswith(f"law.{name}.") for key in keys)]

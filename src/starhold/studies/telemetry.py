@@ -1,4 +1,5 @@
-"""Telemetry: readings, estimates and commands that a satellite recorded, under the names that runs of a scenario have."""
+"""Telemetry: readings, estimates and commands recorded by a satellite, under the names that they have in runs of a
+scenario."""
 
 from __future__ import annotations
 
@@ -33,14 +34,14 @@ from starhold.studies.telemetry_files import (
 )
 
 Known: TypeAlias = dict[str, tuple[Quantity, int]]
-"""Quantities by name, with how many numbers each has."""
+"""Quantities by name, each with its number of components."""
 MISSED = 1.5
-"""A step longer than this many intervals has rows missing."""
+"""The number of intervals above which a time step counts as a gap with missing rows."""
 
 
 class Gaps(NamedTuple):
-    """Rows that a file has; those that are missing by the interval, whose time is empty, that of another row, or before that
-    of an earlier one; and the interval (s)."""
+    """The numbers of rows in a file: present, missing according to the interval, without a time, with a repeated time, and
+    out of order; and the interval (s)."""
 
     rows: int
     missing: int
@@ -51,7 +52,7 @@ class Gaps(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """Tell what is there, and what is missing."""
+        """A sentence on the rows that are present and missing."""
         words = ("missing", "without a time", "at the time of another", "out of order")
         faults = [f"{count} {word}" for count, word in zip(self[1:5], words, strict=True) if count]
         return f"{self.rows} rows, one every {self.interval:g} s; {', '.join(faults) if faults else 'none missing'}"
@@ -61,9 +62,9 @@ class Gaps(NamedTuple):
 class Telemetry:
     """Recorded quantities over time.
 
-    times: (n,) s, increasing, since the scenario's epoch where times are absolute and it states one, since the first sample
-    where it states none, or as a run counts them; columns: arrays (n, k), SI, by the names that runs have, NaN where there
-    is nothing; known: unit and meaning of each; gaps: of each file; absolute: whether times count from an epoch."""
+    times: (n,) s, increasing. Absolute times count from the scenario's epoch or, if it states none, from the first sample;
+    others are those of a run. columns: arrays (n, k), SI, by their names in runs, NaN where nothing is recorded; known: unit
+    and meaning of each; gaps: those of each file; absolute: whether times count from an epoch."""
 
     name: str
     times: Array
@@ -77,7 +78,7 @@ class Telemetry:
 
     @property
     def sentence(self) -> str:
-        """Tell what was read and what is missing."""
+        """Sentences on what was read and what is missing."""
         files = [f"{name} has {gaps.sentence}" for name, gaps in self.gaps.items()]
         counts = {name: int(np.isnan(values).any(axis=1).sum()) for name, values in self.columns.items()}
         empty = [f"{name} in {count}" for name, count in counts.items() if count]
@@ -85,8 +86,8 @@ class Telemetry:
 
 
 def quantities_of(loop: ClosedLoop) -> Known:
-    """The quantities that telemetry of a loop may have, with how many numbers each has: what runs record, and the readings
-    of sensors that they do not."""
+    """Return the quantities that telemetry of a loop may contain, with their numbers of components: those that runs record,
+    and the readings of sensors that they do not."""
     known = {name: (meant, size) for name, meant, size in recorded(loop)}
     for fitted, reading in zip(loop.used("sensor"), sensed_of(loop)[1], strict=True):
         for name, value in {} if is_recorded(fitted.part) else reading._asdict().items():
@@ -101,9 +102,9 @@ def check(scenario: Scenario, entry: LawEntry, source: Any, mapping: str | Path 
 
 
 def read(scenario: Scenario, loop: ClosedLoop, source: Any, mapping: str | Path | None = None) -> Telemetry:
-    """The telemetry in a file, the folder of a run, or a Dataset of `simulate`, for a loop of a scenario. mapping: a file,
-    or the name of one that comes with starhold, that says which columns hold what; recordings of starhold need none.
-    InputError for a file, a column or a unit that does not fit."""
+    """Return the telemetry in a file, the folder of a run, or a Dataset of `simulate`, for a loop of a scenario. mapping: a
+    file, or the name of a built-in one, with the meaning of the columns; recordings of starhold need none. InputError for an
+    unsuitable file, column or unit."""
     import pandas as pd
 
     known = quantities_of(loop)
@@ -126,7 +127,7 @@ def read(scenario: Scenario, loop: ClosedLoop, source: Any, mapping: str | Path 
         zero = float(np.nanmin(seconds)) if zero is None else zero
         numbers = {n: values_of(here, n, c, known[n], place, where) for n, c in columns.items() if c.file == file}
         each = {(n, k): values[:, k] for n, values in numbers.items() for k in range(values.shape[1])}
-        # Times since 1970 are known to less than a microsecond.
+        # Floats resolve times since 1970 to better than a microsecond.
         part = pd.DataFrame(each, index=np.round(seconds - zero, 6) if absolute else seconds - zero)
         gaps[place.name], part = _in_order(part, table.interval)
         parts.append(part)
@@ -143,7 +144,7 @@ def read(scenario: Scenario, loop: ClosedLoop, source: Any, mapping: str | Path 
 def _columns(
     known: Mapping[str, tuple[Quantity, int]], table: MappingTable, frame: Any, path: Path
 ) -> dict[str, ColumnsTable]:
-    """The columns of each quantity: those that a mapping names, or those under the names that starhold gives."""
+    """Return the columns of each quantity: those that a mapping names, by default those with starhold's names."""
     named = {name: heads_of(name, *meant) for name, meant in known.items()}
     if table.columns:
         return {n: c if c.columns else c.model_copy(update={"columns": named[n]}) for n, c in table.columns.items()}
@@ -155,18 +156,18 @@ def _columns(
 
 
 def _epoch(scenario: Scenario) -> float | None:
-    """When a scenario's flight begins, UTC in s since 1970; None where it states no epoch."""
+    """Return the start of a scenario's flight, UTC in s since 1970; None where it states no epoch."""
     epoch = getattr(getattr(scenario.table, "orbit", None), "epoch", None)
     return None if epoch is None else float(np.datetime64(iso_text(epoch), "us").astype(float)) * 1e-6
 
 
 def _in_order(part: Any, interval: float | None) -> tuple[Gaps, Any]:
-    """A table by its times, increasing, rows of equal times as one; what is missing by the interval, which is the median
-    step if None."""
+    """Return the gaps and the table sorted by time, with rows of equal times merged; interval: by default the median time
+    step."""
     timed = part[part.index.notna()]
     times = timed.index.to_numpy()
     disordered = int((times < np.maximum.accumulate(times)).sum())
-    # Of rows of one time the first number of each column is taken.
+    # Of rows with equal times the first number of each column is taken.
     ordered = timed.groupby(level=0).first()
     steps = np.diff(ordered.index.to_numpy())
     usual = float(interval or (np.median(steps) if len(steps) else 0.0))

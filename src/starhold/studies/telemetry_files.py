@@ -1,4 +1,4 @@
-"""Files of telemetry as tables, and the mappings that say what their columns hold."""
+"""Reads files of telemetry as tables, and the mappings that define their columns."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ SUFFIXES = {".csv": "csv", ".parquet": "parquet", ".aem": "aem", ".nc": "netcdf"
 LABELS = {"axis": ("x", "y", "z"), "quaternion": ("q0", "q1", "q2", "q3")}
 DAY = 86400.0
 UNIX_DAY = {"jd": 2440587.5, "mjd": 40587.0}
-"""The first day of 1970 as a Julian date and as a modified one."""
+"""The start of 1970 as a Julian date and as a modified Julian date."""
 GPS_EPOCH = 315964800.0
 """The beginning of GPS time, 1980 January 6, in s since 1970."""
 _LEAPS = """1981-07 1982-07 1983-07 1985-07 1988-01 1990-01 1991-01 1992-07 1993-07 1994-07 1996-01 1997-07 1999-01 2006-01
 2009-01 2012-07 2015-07 2017-01"""
 LEAPS = np.array([np.datetime64(f"{month}-01", "s") for month in _LEAPS.split()]).astype(float)
-"""UTC in s since 1970 from which on there is one leap second more since 1980 (IERS Bulletin C)."""
+"""The UTC times (s since 1970) after which there is one more leap second since 1980 (IERS Bulletin C)."""
 MOST_SHOWN = 200
-"""Characters of a list of columns in an error."""
+"""The most characters of a list of columns in an error."""
 OFF_AXES = 1e-6
-"""By how much a matrix between axes may fail to be orthogonal."""
+"""The largest deviation from orthogonality of a matrix between axes."""
 
 
 class TimeTable(Table):
-    """The column of times, its unit, and from when they count: the start of a run, the first sample, or absolutely."""
+    """The column of times, its unit, and its origin: the start of a run, the first sample, or an absolute epoch."""
 
     column: str = "time"
     base: Literal["run", "first", "utc", "unix", "gps", "jd", "mjd"] = "run"
@@ -52,9 +52,9 @@ class TimeTable(Table):
 
 
 class ColumnsTable(Table):
-    """Columns that hold one quantity, in TELEMETRY or in another file beside it, and their unit if not SI. Of a quaternion:
-    where its scalar stands, whether it turns the body to the reference, and that reference; axes: the matrix from the
-    file's axes to the body's."""
+    """The columns of one quantity, in TELEMETRY or in another file beside it, and their unit if not SI. For a quaternion:
+    the position of its scalar, whether it is conjugate (rotates the body to the reference frame), and the reference frame;
+    axes: the matrix from the file's axes to the body's."""
 
     columns: tuple[str, ...] = ()
     file: str = ""
@@ -62,28 +62,30 @@ class ColumnsTable(Table):
     scalar: Literal["first", "last"] = "first"
     conjugate: Flag = False
     frame: Literal["", "EME2000"] = ""
-    axes: Annotated[Any, *quantity(Gain("1", shape=(3, 3), spread=False, text="from the file's axes to the body's"))] = None
+    axes: Annotated[
+        Any, *quantity(Gain("1", shape=(3, 3), spread=False, text="matrix from the file's axes to the body's"))
+    ] = None
 
 
 class MappingTable(Table):
-    """How a file is read. missing: words for no number, besides nothing and nan; interval: from one row to the next."""
+    """The mapping of a file. missing: words for a missing number, besides an empty cell and nan; interval: between rows."""
 
     kind: Literal["", "csv", "parquet", "aem", "netcdf"] = ""
     separator: str = ","
     missing: tuple[str, ...] = ()
-    interval: Annotated[Any, *quantity(Gain("s", above=0.0, text="from one row to the next"))] = None
+    interval: Annotated[Any, *quantity(Gain("s", above=0.0, text="time between rows"))] = None
     time: TimeTable = TimeTable()
     columns: dict[str, ColumnsTable] = Field(default_factory=dict[str, ColumnsTable])
 
 
 class MappingFile(Table):
-    """A file with a mapping."""
+    """The contents of a mapping file."""
 
     telemetry: MappingTable
 
 
 def mapping_names() -> list[str]:
-    """The names of the mappings that come with starhold."""
+    """Return the names of the built-in mappings."""
     return sorted(item.name.removesuffix(".toml") for item in _shipped().iterdir() if item.name.endswith(".toml"))
 
 
@@ -92,7 +94,7 @@ def _shipped() -> Any:
 
 
 def read_mapping(source: str | Path) -> MappingTable:
-    """The mapping in a file, or one that comes with starhold, by its name. InputError for what is none."""
+    """Return the mapping in a file, or the built-in one of this name. InputError where it is not a mapping."""
     where = str(source)
     try:
         text = (_shipped() / f"{where}.toml").read_text("utf-8") if where in mapping_names() else read_text(Path(where))
@@ -103,26 +105,26 @@ def read_mapping(source: str | Path) -> MappingTable:
 
 
 def existing(source: Any) -> Any:
-    """The name of telemetry itself. InputError where there is no such file or folder, before anything else is read."""
+    """Return the name of telemetry unchanged. InputError, before anything else is read, if no such file or folder exists."""
     if isinstance(source, str) and not Path(source).exists():
         raise InputError(str(source), "", "no file", "a file of telemetry")
     return source
 
 
 def existing_mapping(source: Any) -> Any:
-    """The name of a mapping itself. InputError where there is none, or none that can be read."""
+    """Return the name of a mapping unchanged. InputError where there is none, or it cannot be read."""
     read_mapping(source)
     return source
 
 
 def heads_of(name: str, meant: Quantity, size: int) -> tuple[str, ...]:
-    """The columns of a quantity in a table that starhold writes: rate_x, attitude_q0, wheel_momentum_1, error_angle."""
+    """Return the columns of a quantity in starhold's tables, such as rate_x, attitude_q0, wheel_momentum_1, error_angle."""
     labels = LABELS.get(meant.dimension, tuple(str(k + 1) for k in range(size)))
     return tuple(f"{name}_{label}" for label in labels) if meant.dimension else (name,)
 
 
 def table_of(source: Any, path: Path, mapping: MappingTable) -> tuple[Any, MappingTable]:
-    """The table in a file, or of a Dataset, as a DataFrame, and the mapping completed by what such a file says itself."""
+    """Return the table in a file, or of a Dataset, as a DataFrame, and the mapping completed from the file's own header."""
     import pandas as pd
 
     kind = mapping.kind or SUFFIXES.get(path.suffix.lower(), "netcdf" if path.is_dir() else "")
@@ -138,7 +140,7 @@ def table_of(source: Any, path: Path, mapping: MappingTable) -> tuple[Any, Mappi
         if kind == "parquet":
             return optional("pyarrow.parquet", "Parquet", "campaign").read_table(path).to_pandas(), mapping
         with warnings.catch_warnings():
-            # A row longer than the heading is but warned of.
+            # For a row longer than the heading pandas would only warn.
             warnings.simplefilter("error")
             words: dict[str, Any] = {"na_values": list(mapping.missing), "encoding": "utf-8-sig", "comment": "#"}
             words |= {"sep": mapping.separator, "skipinitialspace": True, "index_col": False, "low_memory": False}
@@ -148,7 +150,7 @@ def table_of(source: Any, path: Path, mapping: MappingTable) -> tuple[Any, Mappi
 
 
 def _message(path: Path, mapping: MappingTable) -> tuple[Any, MappingTable]:
-    """An attitude ephemeris message: its attitude, and times by its own time system."""
+    """Return the attitude in an attitude ephemeris message, and the mapping with its time system."""
     import pandas as pd
 
     message = parse_aem(path)
@@ -162,7 +164,7 @@ def _message(path: Path, mapping: MappingTable) -> tuple[Any, MappingTable]:
 
 
 def column_of(frame: Any, name: str, path: Path) -> Any:
-    """A column of a table. InputError where it has none of this name."""
+    """Return the column of a table with this name. InputError where there is none."""
     if name not in frame:
         raise InputError(
             str(path), "", f"no column {name}", cut(nearest(name, [str(head) for head in frame.columns]), MOST_SHOWN)
@@ -171,7 +173,7 @@ def column_of(frame: Any, name: str, path: Path) -> Any:
 
 
 def numbers_in(column: Any, name: str, path: Path) -> Array:
-    """The numbers of a column, (n,), NaN where there is none. InputError for a word."""
+    """Return the numbers (n,) of a column, NaN where a number is missing. InputError for a word."""
     import pandas as pd
 
     values: Any = pd.to_numeric(column, errors="coerce")
@@ -186,8 +188,7 @@ def numbers_in(column: Any, name: str, path: Path) -> Array:
 
 
 def seconds_of(frame: Any, time: TimeTable, path: Path, where: str) -> Array:
-    """Times (n,) in s since 1970, UTC by days of 86400 s, where they are absolute, else as they count; NaN where there is
-    none."""
+    """Return times (n,) in s, NaN where missing: absolute ones since 1970, UTC with days of 86400 s, others unchanged."""
     import pandas as pd
 
     raw = column_of(frame, time.column, path)
@@ -210,7 +211,7 @@ def seconds_of(frame: Any, time: TimeTable, path: Path, where: str) -> Array:
 
 
 def values_of(frame: Any, name: str, column: ColumnsTable, known: tuple[Quantity, int], path: Path, where: str) -> Array:
-    """The numbers (n, k) of a quantity, SI. InputError for columns or a unit that do not fit it."""
+    """Return the numbers (n, k) of a quantity, SI. InputError where the columns or the unit do not fit it."""
     meant, size = known
     key = f"telemetry.columns.{name}"
     if len(column.columns) != size:
@@ -221,7 +222,9 @@ def values_of(frame: Any, name: str, column: ColumnsTable, known: tuple[Quantity
             values = values * to_number(f"1 {column.unit}", meant.unit)
     turned, attitude = column.axes, meant.dimension == "quaternion"
     if not attitude and (column.conjugate or column.scalar == "last" or column.frame):
-        raise InputError(where, key, f"{meant.text}, which is no quaternion", "scalar, conjugate and frame for quaternions")
+        raise InputError(
+            where, key, f"{meant.text}, which is not a quaternion", "scalar, conjugate and frame for quaternions"
+        )
     if attitude:
         values = np.roll(values, 1, axis=1) if column.scalar == "last" else values
         values = np.stack(conjugate(tuple(values.T)), axis=1) if column.conjugate else values  # type: ignore[arg-type]
@@ -233,5 +236,5 @@ def values_of(frame: Any, name: str, column: ColumnsTable, known: tuple[Quantity
     if meant.dimension == "axis":
         return values @ matrix.T
     if not attitude:
-        raise InputError(where, f"{key}.axes", f"{meant.text}, which is no vector", "axes for vectors and quaternions")
+        raise InputError(where, f"{key}.axes", f"{meant.text}, which is not a vector", "axes for vectors and quaternions")
     return np.stack(multiply(tuple(values.T), to_quaternion(turned)), axis=1)  # type: ignore[arg-type]

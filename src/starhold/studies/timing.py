@@ -1,4 +1,4 @@
-"""The cost of laws' calls, which a copy of this process compiles while the laws fly."""
+"""Times the calls of laws, in a forked process that compiles them while the laws fly."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 
 class Stopwatch:
-    """A copy of this process, on systems that can fork, that compiles the calls of these loops' laws at once and times them
-    on request. Leaving the context ends it."""
+    """A forked copy of this process, on systems that can fork, which compiles the calls of the loops' laws immediately and
+    times them on request. It ends with the context."""
 
     def __init__(self, scenario: Scenario, loops: Sequence[Any]) -> None:
         self._scenario, self._loops, self._child = scenario, loops, None
@@ -45,13 +45,13 @@ class Stopwatch:
             self._child.join()
 
     def timed(self, place: int, flight: Flight) -> Flight:
-        """Return the flight of the loop with this index, from 0, with the cost of a call of its law. Nothing else should run
-        meanwhile."""
+        """Return the flight of the loop with this index, from 0, with the time per call of its law among the metrics.
+        Nothing else should run meanwhile."""
         if self._child is not None:
             run = flight.recording
-            # Only what can be timed is sent.
+            # Only the data needed for timing are sent.
             begun = {name: values[:CALLS] if np.ndim(values) else values for name, values in run.arrays.items()}
-            # If it has died, the cause is raised here.
+            # If the process has died, the cause is raised here.
             with suppress(EOFError, OSError):
                 self._ours.send((place, replace(run, arrays=begun)))
                 return costing(flight, self._ours.recv())
@@ -59,7 +59,7 @@ class Stopwatch:
 
 
 def _serve(scenario: Scenario, loops: Sequence[Any], requests: Connection, other: Connection) -> None:
-    """Time calls on request until this process or the original one, which has the other end, is ended."""
+    """Time calls on request until this process, or the original one at the other end of the pipe, ends."""
     # Ctrl-C and the like end the original process, and that ends this one.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)

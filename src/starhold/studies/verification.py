@@ -1,4 +1,4 @@
-"""Verdicts on requirements, with the number, its limit and the evidence; and those by one flight."""
+"""Verdicts on requirements, with number, limit and evidence, and the verdicts from one flight and from inspections."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ if TYPE_CHECKING:
 
 Outcome: TypeAlias = Literal["met", "missed", "not decided"]
 WORST: tuple[Outcome, ...] = ("met", "not decided", "missed")
-"""Outcomes, the worst last."""
+"""The outcomes from best to worst."""
 DEARER, ELSEWHERE = ("proof", "campaign", "budget", "margin"), "left to starhold verify"
-"""The methods for which one flight is not enough, with the text shown in their place."""
+"""The methods that need more than one flight, with the text shown in their place."""
 
 
 @dataclass(frozen=True)
 class RequirementVerdict:
-    """Whether a requirement is met. number, limit and margin are in `unit` (SI), None where there is none; a margin of 0 or
-    more keeps it. evidence: a sentence, without its end, on what the verdict rests on; left_out: what the loop has and the
-    evidence does not speak of, without which "met" must not be said."""
+    """The verdict on a requirement. number, limit and margin are in `unit` (SI), or None; the requirement is met if the
+    margin is 0 or more. evidence: a sentence, without its full stop, on the basis of the verdict; left_out: features of the
+    loop that the evidence does not cover, which must be stated with "met"."""
 
     id: str
     text: str
@@ -63,28 +63,28 @@ class RequirementVerdict:
     rationale: str = ""
     typed_unit: str = ""
     scale: float = 1.0
-    """The unit in which the limit is typed, and the value of one SI unit in it."""
+    """The value of one SI unit in the unit in which the limit is typed."""
 
     @property
     def margin(self) -> float | None:
-        """Return how far the number is on the good side of the limit."""
+        """The distance of the number from the limit, positive on the allowed side, or None."""
         if self.number is None or self.limit is None:
             return None
         return self.limit - self.number if self.at_most else self.number - self.limit
 
     @property
     def sentence(self) -> str:
-        """The verdict, with what it leaves out, so that it claims no more than is known."""
+        """The verdict together with what it leaves out, so that it does not claim too much."""
         return f"{self.verdict}, leaving out {'; '.join(self.left_out)}" if self.left_out else self.verdict
 
 
 def undecided(table: RequirementTable, why: str, **known: Any) -> RequirementVerdict:
-    """Return the verdict that a requirement is not decided, with the reason."""
+    """Return the verdict "not decided" on a requirement, with the reason."""
     return verdict_on(table, "not decided", why, **known)
 
 
 def limits(table: RequirementTable, required: Requirement) -> dict[str, Any]:
-    """Return the fields of a verdict that state its limit, in its unit and in the typed one."""
+    """Return the fields of a verdict that state its limit, in SI and in the typed unit."""
     fields: dict[str, Any] = {"limit": required.bound, "unit": required.unit, "at_most": required.at_most}
     typed = table.at_most if required.at_most else table.at_least
     if isinstance(typed, str) and required.bound:
@@ -106,15 +106,15 @@ def verdict_on(table: RequirementTable, verdict: Outcome, evidence: str, **known
 def compared(
     table: RequirementTable, required: Requirement, number: float | None, evidence: str, **known: Any
 ) -> RequirementVerdict:
-    """Return the verdict for a number, which misses the limit where it is None or NaN."""
+    """Return the verdict from a number; None and NaN miss the limit."""
     there = None if number is None or math.isnan(number) else float(number)
     decided = verdict_on(table, "missed", evidence, number=there, **limits(table, required) | known)
     return replace(decided, verdict="met") if decided.margin is not None and decided.margin >= 0.0 else decided
 
 
 def in_order(scenario: Scenario, decided: Mapping[str, RequirementVerdict]) -> tuple[RequirementVerdict, ...]:
-    """Return the verdicts in the order of the file: those decided, by the tables' names in errors, and those of requirements
-    without a method, which take the worst verdict of those derived from them."""
+    """Return the verdicts in the order of the file. decided: the verdicts of methods, by the tables' names in errors.
+    Requirements without a method take the worst verdict of those derived from them."""
     tables = {f"requirement[{place}]": table for place, table in enumerate(scenario.table.requirement, 1)}
     by_id = {tables[key].called: verdict for key, verdict in decided.items()}
 
@@ -131,8 +131,8 @@ def in_order(scenario: Scenario, decided: Mapping[str, RequirementVerdict]) -> t
 
 
 def verdicts_of_flight(scenario: Scenario, flight: Flight) -> tuple[RequirementVerdict, ...]:
-    """Return the verdicts on a scenario's requirements by a flight of one of its laws, and by records of inspections:
-    nothing is flown or proved, and other methods are left to `starhold verify`. InputError as from `check_flight`."""
+    """Return the verdicts on a scenario's requirements from an existing flight of one of its laws and from records of
+    inspections; other methods are left to `starhold verify`. InputError as in `check_flight`."""
     entry = scenario.pick(flight.name)
     decided = by_flight(scenario, entry, flight.recording) | by_inspection(scenario)
     others = {key: table for method in DEARER for key, table in tables_of(scenario, method).items()}
@@ -143,7 +143,7 @@ def verdicts_of_flight(scenario: Scenario, flight: Flight) -> tuple[RequirementV
 
 
 def by_inspection(scenario: Scenario) -> dict[str, RequirementVerdict]:
-    """Return the verdicts of requirements by inspection: met where the file of the record exists."""
+    """Return the verdicts on requirements verified by inspection: met if the file of the record exists."""
     return {key: _inspected(scenario, table) for key, table in tables_of(scenario, "inspection").items()}
 
 
@@ -162,8 +162,8 @@ def _inspected(scenario: Scenario, table: RequirementTable) -> RequirementVerdic
 
 
 def check_flight(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]:
-    """Return the requirements that one flight of a law decides. InputError for a metric that the body's flights lack, a
-    limit in another unit, a mode that the law lacks, and times outside the flight."""
+    """Return the requirements that one flight of a law decides. InputError for a metric that is not measured in flights, a
+    limit in a wrong unit, an unknown mode, and times outside the flight."""
     tables, study = tables_of(scenario, "flight"), study_of(scenario.body)
     check_modes(scenario, entry, tables)
     loop = build(scenario, entry)
@@ -183,7 +183,7 @@ def mode_names(entry: LawEntry) -> list[str]:
 
 
 def check_modes(scenario: Scenario, entry: LawEntry, tables: Mapping[str, RequirementTable]) -> None:
-    """Raise InputError where a requirement is about a mode that the law does not have."""
+    """Raise InputError where a requirement names a mode that the law does not have."""
     names = mode_names(entry)
     for key, table in tables.items():
         if table.in_mode is not None and table.in_mode not in names:
@@ -192,7 +192,7 @@ def check_modes(scenario: Scenario, entry: LawEntry, tables: Mapping[str, Requir
 
 
 def by_flight(scenario: Scenario, entry: LawEntry, run: Recording) -> dict[str, RequirementVerdict]:
-    """Return the verdicts by a recorded flight of a law. InputError as from `check_flight`."""
+    """Return the verdicts from a recorded flight of a law. InputError as in `check_flight`."""
     tables = tables_of(scenario, "flight")
     if not tables:
         return {}
@@ -213,7 +213,7 @@ def by_flight(scenario: Scenario, entry: LawEntry, run: Recording) -> dict[str, 
 
 
 def _begun(table: RequirementTable, required: Requirement, entry: LawEntry, run: Recording) -> RequirementVerdict:
-    """The verdict on when a mode first begins."""
+    """Return the verdict on the time at which a mode first begins."""
     times = [begun.time for begun in modes_flown(entry.law, run) if begun.mode == table.in_mode]
     evidence = f"one flight of {entry.name}{'' if times else f', in which the mode {table.in_mode} never begins'}"
     return compared(table, required, times[0] if times else None, evidence)
@@ -234,8 +234,8 @@ def _flown(
 
 
 def _parts(run: Recording, times: Times, mode: int | None) -> list[Recording]:
-    """Return the parts of a recording, of at least two samples, within times since its start, or since a mode, counted from
-    1, began."""
+    """Return the parts of a recording, with at least two samples, within times since its start, or since each beginning of a
+    mode, counted from 1."""
     attrs, time = run.attrs, run["time"]
     clock, period, every = attrs.get("time_unit_s", 1.0), attrs["control_period"], attrs["record_every"]
     spans = [(0, None)]

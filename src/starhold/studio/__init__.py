@@ -1,1 +1,1 @@
-"""The studio serves a page on this machine, where scenarios are edited, flown, certified and compared."""
+"""The studio: a page served on this machine, where scenarios are edited, flown, certified and compared."""

@@ -1,4 +1,4 @@
-"""Scenarios are checked in a process of their own, for the files that they name may not end, or end the process."""
+"""Checks scenarios in a separate process, because the files that they name may hang or end the process."""
 
 import hashlib
 import threading
@@ -15,7 +15,7 @@ from starhold.studio.apart import begin
 
 
 class RefusedError(Exception):
-    """A file is not written; `answer` is the reply."""
+    """Raised where a file is not read or written; `answer` is the reply to the page."""
 
     def __init__(self, error: str, **details: Any) -> None:
         super().__init__(error)
@@ -23,7 +23,7 @@ class RefusedError(Exception):
 
 
 class Documents:
-    """Files of scenarios in a folder; `path`: the one that the studio was started with, of any name."""
+    """The scenario files in a folder; `path`: the file with which the studio was started, of any name."""
 
     def __init__(self, path: Path | None) -> None:
         self.path = None if path is None else path.absolute()
@@ -31,7 +31,7 @@ class Documents:
         self._lock = threading.Lock()
 
     def read(self) -> dict[str, Any]:
-        """The file that the studio was started with, as the page knows files: name, text, and the version of it."""
+        """Return the file with which the studio was started, for the page: its name, text, and version."""
         assert self.path is not None
         content = self._content(self.path)
         if content is None:
@@ -39,16 +39,16 @@ class Documents:
         return {"name": self.path.name, "text": _text(content), "version": _version(content)}
 
     def save(self, name: str, text: str, version: str) -> dict[str, Any]:
-        """Write a text; `version` is that of the file as it was last seen, "" for one that is new. Refused where the file is
-        another by now."""
+        """Write a text and return the new version. version: that of the file when it was last read, "" for a new file.
+        Refused where the file has changed since."""
         if not text.strip():
             raise RefusedError(f"{name}: an empty text is not saved")
-        # A link stays one: what it leads to is written.
+        # A symbolic link is kept: its target is written.
         path = self._path(name).resolve()
         try:
             content = text.encode()
         except UnicodeEncodeError:
-            raise RefusedError(f"{name}: characters that no file holds") from None
+            raise RefusedError(f"{name}: characters that cannot be written to a file") from None
         with self._lock:
             before = self._content(path)
             now = "" if before is None else _version(before)
@@ -87,7 +87,7 @@ def _text(content: bytes) -> str:
     try:
         return content.decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError:
-        raise RefusedError("the file is no longer text in UTF-8; nothing of it is shown or saved") from None
+        raise RefusedError("the file is no longer UTF-8 text; it is neither shown nor saved") from None
 
 
 def _version(content: bytes) -> str:
@@ -95,32 +95,32 @@ def _version(content: bytes) -> str:
 
 
 LONGEST = 20.0
-"""Seconds that a check may take."""
+"""The longest time (s) of a check."""
 
 
 class Checker:
-    """Checks one text at a time; its process begins with the first one, and again after one that was ended."""
+    """Checks one text at a time, in a process that starts with the first text and again after it has ended."""
 
     def __init__(self, longest: float = LONGEST) -> None:
         self._longest, self._lock = longest, threading.Lock()
         self._pool: ProcessPoolExecutor | None = None
 
     def check(self, text: str, where: str, folder: Path) -> dict[str, Any]:
-        """Return the answer of `editing.check` about a text, or that its check does not end."""
+        """Return the answer of `editing.check` about a text, or an error if the check does not end."""
         with self._lock:
             self._pool = self._pool or ProcessPoolExecutor(1, get_context("spawn"), begin)
             try:
                 return self._pool.submit(_check, text, where, folder).result(self._longest)
             except TimeoutError:
-                why = f"did not end within {self._longest:g} s; a file that it names may not"
+                why = f"did not end within {self._longest:g} s; a file that the scenario names may hang"
             except BrokenProcessPool:
-                why = "ended without an answer; a file that it names may have ended it"
+                why = "ended without an answer; a file that the scenario names may have ended it"
             self.close()
             return {"error": f"{where}: the check {why}"}
 
     def close(self) -> None:
         """End the process."""
-        # Without the lock, which a check that does not end holds.
+        # Without the lock, which a hanging check holds.
         pool, self._pool = self._pool, None
         if pool is not None:
             for process in list((pool._processes or {}).values()):

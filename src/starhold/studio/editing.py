@@ -1,4 +1,4 @@
-"""An editor shows where in a file an error is, and which keys and values fit a place."""
+"""The data for the editor: the line of an error in a file, and the keys and values allowed in each table."""
 
 import re
 from pathlib import Path
@@ -15,13 +15,13 @@ from starhold.scenario.reading import builtin_names, parse
 from starhold.scenario.writing import law_table, part_table, toml_text
 
 TABLES = (".csv", ".aem", ".reqif")
-"""How files of numbers end; others that a scenario names are Python."""
+"""The suffixes of files of numbers; other files that a scenario names are Python."""
 
 _HEAD = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 
 
 def check(text: str, where: str, folder: Any) -> dict[str, Any]:
-    """Return whether a text is a scenario that can be flown and verified, with its name and laws, or its first error."""
+    """Return the name and laws of a scenario that can be flown and verified, or the first error in its text."""
     try:
         scenario = parse(text, where, folder)
         for entry in scenario.laws:
@@ -35,7 +35,7 @@ def check(text: str, where: str, folder: Any) -> dict[str, Any]:
 
 
 def files_run(text: str) -> list[str]:
-    """The files that are run as Python where a scenario of this text is read."""
+    """Return the files that are run as Python when a scenario with this text is read."""
     try:
         tables = read_toml(text, "")
     except InputError:
@@ -56,8 +56,8 @@ def files_run(text: str) -> list[str]:
 
 
 def line_of(text: str, key: str, message: str = "") -> int | None:
-    """The line, from 1, that holds a key as errors call it ("law[2].k_rate", "spacecraft.inertia"), its table where the key
-    is missing, or what a TOML error says; None where that is nowhere."""
+    """Return the line, from 1, of a key named as in errors ("law[2].k_rate", "spacecraft.inertia"), of its table where the
+    key is missing, or that of a TOML error; None where there is none."""
     if place := re.search(r"at line (\d+)", message):
         return int(place[1])
     parts = re.findall(r"([^.\[\]]+)(?:\[(\d+)\])?", key.replace("law ", "law."))
@@ -81,8 +81,8 @@ def line_of(text: str, key: str, message: str = "") -> int | None:
 
 
 def words() -> dict[str, Any]:
-    """The tables of files with their keys, of every body, by table; those of laws and parts by type; each key with what it
-    means and, where there are such, the words it may be."""
+    """Return the tables of scenario files of every body, by name, and those of laws and parts, by type; each has its keys
+    with their meanings and the words that are allowed as values, if any."""
     schema = json_schema()
     tables: dict[str, dict[str, Any]] = {}
     kinds: dict[str, dict[str, Any]] = {"law": {}, "part": {}}
@@ -126,7 +126,7 @@ def _meaning(item: Any) -> dict[str, Any]:
 
 
 def choices() -> dict[str, Any]:
-    """The laws and parts to pick from, each with a line about it and a table to put into a file, and the built-in
+    """Return the available laws and parts, each with a line about it and a table to insert into a file, and the built-in
     scenarios."""
 
     laws = [
@@ -142,7 +142,7 @@ def choices() -> dict[str, Any]:
         try:
             table = toml_text({"part": [part_table(part, examples[0])]}).lstrip("\n")
         except (InputError, TypeError, ValueError):
-            # One that holds a table of samples, which is no line of a file.
+            # A part with a table of samples, which does not fit on a line of a file.
             continue
         parts.append({"name": name, "text": f"{part.role}: {part.module.CARD.summary}", "table": table})
     return {"laws": laws, "parts": parts, "scenarios": builtin_names()}

@@ -16,7 +16,7 @@ from starhold.studio.worker import work
 
 SPAWN = get_context("spawn")
 MOST = 3
-"""The most jobs that run at a time."""
+"""The largest number of jobs at a time."""
 
 
 @dataclass
@@ -33,7 +33,7 @@ class Job:
     ended: bool = False
 
     def status(self) -> dict[str, Any]:
-        """Describe the task for the page."""
+        """Return a description of the task for the page."""
         return {
             "number": self.number,
             "kind": self.kind,
@@ -53,39 +53,39 @@ class Jobs:
         self._lock = threading.Lock()
 
     def start(self, kind: str, name: str, text: str, where: str, beside: Path, laws: Sequence[str]) -> Job:
-        """Begin a job about these laws; ValueError where as many as may are at work."""
+        """Start a job about these laws and return it. ValueError where the largest number of jobs is running."""
         with self._lock:
             if sum(not job.ended for job in self._jobs.values()) >= MOST:
-                raise ValueError(f"{MOST} things are at work already; stop one, or wait")
+                raise ValueError(f"{MOST} jobs are running already; stop one, or wait")
             number = len(self._jobs) + 1
             folder = Path(self._place.name) / str(number)
             folder.mkdir()
             reports, teller = SPAWN.Pipe(duplex=False)
             process = SPAWN.Process(target=work, args=(teller, kind, text, where, beside, folder, laws))
             process.start()
-            # The end of the process closes the last teller.
+            # When the process ends, the last sending end of the pipe is closed.
             teller.close()
             job = self._jobs[number] = Job(number, kind, name, folder, process, laws)
         threading.Thread(target=_follow, args=(job, reports), daemon=True).start()
         return job
 
     def get(self, number: int) -> Job | None:
-        """The job of this number."""
+        """Return the job of this number, or None."""
         return self._jobs.get(number)
 
     def all(self) -> list[dict[str, Any]]:
-        """Describe all tasks for the page."""
+        """Return descriptions of all tasks for the page."""
         return [job.status() for job in self._jobs.values()]
 
     def stop(self, number: int) -> None:
-        """End a job; what it has not written is lost."""
+        """End a job; results that it has not written are lost."""
         job = self._jobs.get(number)
         if job is not None and not job.ended:
             job.state = {"error": "stopped"}
             job.process.terminate()
 
     def close(self) -> None:
-        """End all jobs and take their folders away."""
+        """End all jobs and remove their folders."""
         for number in self._jobs:
             self.stop(number)
         for job in self._jobs.values():
@@ -95,7 +95,7 @@ class Jobs:
 
 
 def _follow(job: Job, reports: Connection) -> None:
-    """Note the reports of a process until it ends."""
+    """Store the reports of a process until it ends."""
     with suppress(EOFError):
         while True:
             state = reports.recv()

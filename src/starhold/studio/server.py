@@ -1,4 +1,4 @@
-"""The studio's server: on this machine alone, for whoever has the token that it was started with."""
+"""The studio's server, which answers only on this machine, and only requests with the token of its start."""
 
 import json
 import secrets
@@ -27,7 +27,7 @@ from starhold.studio.worker import KINDS, RERUN
 
 HOST = "127.0.0.1"
 MOST_TEXT = 2**23
-"""Bytes that a request may have."""
+"""The largest size of a request in bytes."""
 POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
     "worker-src blob:; frame-ancestors 'self'"
@@ -35,8 +35,8 @@ POLICY = (
 
 
 class Guard:
-    """Lets through what names this machine as its host and has the token, in the address of the first request and in a
-    cookie of all others. A page of elsewhere has neither."""
+    """Accepts only requests that name this machine as host and have the token: in the address of the first request, in a
+    cookie of all others. Pages from other sites have neither."""
 
     def __init__(self, app: ASGIApp, token: str) -> None:
         self._app, self._token = app, token
@@ -49,14 +49,14 @@ class Guard:
         answer: Response | None = None
         cookie, receives = cookie_name(scope["server"][1]), receive
         if _host(request) not in (HOST, "localhost"):
-            answer = PlainTextResponse("this studio answers on this machine alone", 403)
+            answer = PlainTextResponse("this studio answers only on this machine", 403)
         elif _equal(request.query_params.get("token", ""), self._token):
             answer = RedirectResponse("/", 303)
             answer.set_cookie(cookie, self._token, httponly=True, samesite="strict")
         elif not _equal(request.cookies.get(cookie, ""), self._token):
             answer = PlainTextResponse("open the address that `starhold studio` printed: it holds the token", 403)
         elif request.method != "GET" and not request.headers.get("content-type", "").startswith("application/json"):
-            answer = PlainTextResponse("JSON is wanted", 415)
+            answer = PlainTextResponse("JSON is required", 415)
         elif (body := await _body(receive)) is None:
             answer = PlainTextResponse("too long", 413)
         else:
@@ -73,12 +73,12 @@ class Guard:
 
 
 def cookie_name(port: int) -> str:
-    """Name the cookie of the studio on a port: browsers keep one jar for all ports of a machine."""
+    """Return the name of the cookie of the studio on a port; browsers share cookies among all ports of a machine."""
     return f"starhold-studio-{port}"
 
 
 def _host(request: Request) -> str:
-    """The host that a request names; "" where it names none."""
+    """Return the host that a request names; "" where it names none."""
     try:
         return request.url.hostname or ""
     except ValueError:
@@ -86,7 +86,7 @@ def _host(request: Request) -> str:
 
 
 async def _body(receive: Receive) -> bytes | None:
-    """The whole body of a request, chunked or not; None if it is too long."""
+    """Return the whole body of a request, chunked or not; None if it is too long."""
     body = b""
     while True:
         message = await receive()
@@ -98,7 +98,7 @@ async def _body(receive: Receive) -> bytes | None:
 
 
 def _given(body: bytes, receive: Receive) -> Receive:
-    """A `receive` that gives a body which was read, and what comes after it."""
+    """Return a `receive` that first gives a body already read and then the remaining messages."""
     left = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def again() -> Any:
@@ -112,8 +112,8 @@ def _equal(given: str, token: str) -> bool:
 
 
 class Studio:
-    """One studio: the folder whose scenarios it edits, and the jobs. `name`: what the text is called that it begins with
-    where no file is given; `run`: files that may be run as Python, for the user said so."""
+    """One studio: the folder whose scenarios it edits, and its jobs. `name`: the name of the initial text where no file is
+    given; `run`: the files that the user allows to be run as Python."""
 
     def __init__(self, path: Path | None, name: str, text: str) -> None:
         self.name, self.text, self.jobs, self.checker = name, text, Jobs(), Checker()
@@ -122,7 +122,7 @@ class Studio:
         self.run: set[str] = set()
 
     def app(self, token: str) -> Starlette:
-        """Make the application."""
+        """Return the web application."""
         routes = [
             Route("/", self._page),
             Mount("/assets", StaticFiles(packages=[("starhold.studio", "assets")])),
@@ -198,7 +198,7 @@ class Studio:
         return self._begun(given["kind"], checked["name"], given["text"], self.where, self.folder, checked["laws"])
 
     async def _again(self, request: Request) -> Response:
-        """Fly one run of a campaign that is a job of this studio again."""
+        """Start a job that flies one run of a campaign of this studio again."""
         given, job = await _strings(request, "law", "run"), self.jobs.get(request.path_params["number"])
         if given is None or job is None or job.kind != "campaign":
             return _malformed()
@@ -208,7 +208,7 @@ class Studio:
         return self._begun(RERUN, f"{law}, run {run}", "", str(job.folder), self.folder, (law, run))
 
     def _begun(self, *job: Any) -> Response:
-        """Begin a job, unless as many as may are at work."""
+        """Start a job, unless the largest number of jobs is running."""
         try:
             return JSONResponse(self.jobs.start(*job).status(), 201)
         except ValueError as error:
@@ -220,7 +220,7 @@ class Studio:
 
     async def _result(self, request: Request) -> Response:
         job, name = self.jobs.get(request.path_params["number"]), request.path_params["name"]
-        # A name of the folder itself, and nothing beyond it.
+        # Only a name in the folder itself, nothing outside it.
         path = None if job is None else next((path for path in job.folder.iterdir() if path.name == name), None)
         if path is None or not path.is_file():
             return PlainTextResponse("no such file", 404)
@@ -228,7 +228,7 @@ class Studio:
 
 
 def _malformed() -> Response:
-    return JSONResponse({"error": "not what is asked here"}, 422)
+    return JSONResponse({"error": "a request with missing or wrong fields"}, 422)
 
 
 async def _answered(work: Callable[[], dict[str, Any]]) -> Response:
@@ -240,7 +240,7 @@ async def _answered(work: Callable[[], dict[str, Any]]) -> Response:
 
 
 async def _json(request: Request) -> Any:
-    """Return what a request holds; None where it is no JSON, or holds what is no text."""
+    """Return the JSON of a request; None where it is not JSON, or contains invalid text."""
     try:
         given = json.loads(await request.body())
         json.dumps(given, ensure_ascii=False).encode()
@@ -250,7 +250,7 @@ async def _json(request: Request) -> Any:
 
 
 async def _strings(request: Request, *names: str) -> dict[str, str] | None:
-    """Read the strings of these names in a request; None where it does not hold them."""
+    """Return the strings of these names in a request; None where one is missing."""
     given = await _json(request)
     if not isinstance(given, dict) or not all(isinstance(given.get(name), str) for name in names):
         return None
@@ -272,7 +272,7 @@ def serve(path: Path | None, name: str, text: str, port: int, announce: Callable
         raise InputError(
             "studio", "--port", f"{port}: {error.strerror}", "another port, or 0 for any that is free"
         ) from None
-    # Who reads the address and asks at once waits for the server to begin.
+    # A client that connects right after reading the address waits until the server starts.
     listener.listen()
     address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
     announce(address)

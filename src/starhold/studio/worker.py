@@ -1,5 +1,4 @@
-"""Does one job of the studio in a process of its own: reports its progress and its result, and leaves its files in a
-folder."""
+"""Does one job of the studio in a separate process: reports its progress and result, and writes its files to a folder."""
 
 import shutil
 import time
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from starhold.campaign.worst import Sought
 
 PULSE = 0.2
-"""Seconds between two lines of progress at least."""
+"""The least time (s) between two reports of progress."""
 
 Tell = Callable[[int, int, str], None]
 
@@ -59,7 +58,7 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
 
 
 def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
-    """A page of a study: its picture, what it shows, and its files."""
+    """Run a study and write its page with the picture, the text, and links to the files; return the page's name."""
     from starhold.report.document import block_html
     from starhold.report.figures import address
     from starhold.report.results import write_result
@@ -148,12 +147,12 @@ KINDS = {
 }
 """The kinds of jobs."""
 RERUN = "rerun"
-"""A further kind: one run of a campaign again."""
+"""The further kind of job that flies one run of a campaign again."""
 
 
 def work(teller: Connection, kind: str, text: str, where: str, beside: Path, folder: Path, laws: Sequence[str]) -> None:
-    """Do a job, in a process of its own; the last report names the page to open, or the error. laws: those of the scenario;
-    of a run of a campaign, whose folder `where` is, the law and the run's number."""
+    """Do a job in its process; the last report names the page to open, or the error. laws: those of the scenario; for a run
+    of the campaign in the folder `where`, the law and the run's number."""
     begin()
     reported = [0.0]
 

@@ -22,7 +22,7 @@ from starhold.certification.matrices import floats
 from starhold.certification.subject import above
 from starhold.certification.unmodelled import pushes
 from starhold.kernel.appended import Appended, Box, Column, Period, after, combined, follow, image
-from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.loops import TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, norm
 from starhold.kernel.polynomials import most, var
 from starhold.kernel.theorems.appendages import FOLLOWED, inner, sized
@@ -86,7 +86,7 @@ class Swinging:
         self.loop, words = loop, sign_words(loop.loop)
         if loop.known.moving:
             raise RefusedError("the target moves")
-        if any(loop.known.modelled) and loop.is_told("measurement.external_torque"):
+        if any(loop.known.modelled) and loop.is_told(TOLD_TORQUE):
             raise RefusedError("the law is told a torque from outside")
         if any(f.part.flag("ACTS") for f in loop.loop.used("effector")):
             raise RefusedError("an effector takes the command")

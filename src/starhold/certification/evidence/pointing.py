@@ -27,12 +27,12 @@ from starhold.certification.evidence.starts import POINTS, asks_more, begins, fe
 from starhold.certification.matrices import above, floats
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
 from starhold.kernel.held import CHANGE, Held
-from starhold.kernel.loops import OUTSIDE, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, Rows, demand, norm
+from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
+from starhold.kernel.numbers import RefusedError, Rows, demand, norm, plus, times, transpose
 from starhold.kernel.plans import Plan
 from starhold.kernel.regions import AT_REST, RATE, TURN, Radii, Tube, balls, widened
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import ROUNDS, image, periods
+from starhold.kernel.theorems.pointing import ROUNDS, periods, spread
 from starhold.kernel.theorems.response import first_of, responds
 from starhold.parts.craft import tensor
 
@@ -150,7 +150,9 @@ class Chain:
                 break
             shape, shares = ellipsoid
             X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
-            rate = max(highest_ratio(image(X, a, A, pushes), X) for A in corners)
+            more = spread(a, pushes)
+            moved = (plus(more, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
+            rate = max(highest_ratio(after, X) for after in moved)
             reach = highest_ratio(widened(tube.region.X, away), X)
             inner = self.motion.tube(tube.region.within(X, away))
             end = self.ends(inner, X, away)
@@ -256,7 +258,7 @@ class Pushed:
 
     def __init__(self, loop: Loop, against: Pushes, noisy: bool = False, given: bool = True) -> None:
         words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
-        if OUTSIDE in loop.words and loop.is_told("measurement.external_torque"):
+        if OUTSIDE in loop.words and loop.is_told(TOLD_TORQUE):
             words.append(OUTSIDE)
         else:
             outside = above(exact(outside) + loop.known.modelled_norm)

@@ -241,9 +241,9 @@ class RecordedLoop:
         return shared | ({"limit" if loop.limit == "axis" else "limit.norm": limit} if isfinite(limit) else {})
 
     def is_told(self, name: str) -> bool:
-        """Return whether the law's program reads an input."""
+        """Return whether the law's program reads a part of a vector."""
         law = self.roles["law"]
-        return name + ".0" in Program.read(self.by_digest[law]).inputs
+        return any(one.startswith(f"{name}.") for one in Program.read(self.by_digest[law]).inputs)
 
     def try_to_show(self, claim: dict[str, Any], scales: Mapping[str, float]) -> bool:
         """Add a claim if evidence for it is found."""

@@ -1,4 +1,4 @@
-"""The command line's commands: each file of this folder has some in its `COMMANDS`, functions or groups of them by name."""
+"""The commands of the command line; each file of this folder has functions, or groups of them, by name in its `COMMANDS`."""
 
 from importlib import import_module
 from pkgutil import iter_modules

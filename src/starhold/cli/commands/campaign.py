@@ -26,22 +26,22 @@ CampaignFolder = Annotated[Path, typer.Argument(metavar="DIR", help="the folder 
 
 def campaign(
     file: ScenarioFile,
-    runs: Annotated[int | None, typer.Option(help="of each law; by default as the file says")] = None,
+    runs: Annotated[int | None, typer.Option(help="runs of each law; by default as in the file")] = None,
     law: OneLaw = None,
-    seed: Annotated[int | None, typer.Option(help="of the draws; by default as the file says")] = None,
+    seed: Annotated[int | None, typer.Option(help="seed of the draws; by default as in the file")] = None,
     sampling: Annotated[
-        str | None, typer.Option(help="random, sobol, latin-hypercube, morris or saltelli; by default as the file says")
+        str | None, typer.Option(help="random, sobol, latin-hypercube, morris or saltelli; by default as in the file")
     ] = None,
     until_decided: Annotated[
-        bool, typer.Option("--until-decided", help="stop once every requirement is decided; runs are the most")
+        bool, typer.Option("--until-decided", help="stop once every requirement is decided, at the latest after all runs")
     ] = False,
     search: Annotated[bool, typer.Option("--search/--no-search", help="search for worst cases of required metrics")] = True,
     proof: Annotated[
         bool,
-        typer.Option("--proof", help="also bound flights by what is proved of the loop; this takes seconds"),
+        typer.Option("--proof", help="also compare flights with the claim about the loop; this takes seconds"),
     ] = False,
-    threads: Annotated[int | None, typer.Option(help="of this process; all cores by default")] = None,
-    workers: Annotated[int | None, typer.Option(help="processes of this machine in place of threads")] = None,
+    threads: Annotated[int | None, typer.Option(help="threads of this process; all cores by default")] = None,
+    workers: Annotated[int | None, typer.Option(help="processes on this machine in place of threads")] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="tcp://HOST:PORT", help="an existing Dask cluster in place of threads")
     ] = None,
@@ -81,7 +81,7 @@ def query(
     sql: Annotated[str, typer.Argument(metavar="SELECT", help='such as "select avg(effort) from runs where failed"')],
     csv: Annotated[bool, typer.Option("--csv", help="comma-separated values in place of a table")] = False,
 ) -> None:
-    """Ask the runs of a campaign a question in SQL; the table is called runs."""
+    """Query the runs of a campaign in SQL; the table is called runs."""
     from rich.table import Table
 
     from starhold.campaign.query import query as ask
@@ -102,7 +102,7 @@ def query(
 
 
 MOST_ROWS = 60
-"""The most rows that are printed as a table."""
+"""The largest number of rows printed as a table."""
 
 
 def _shown(value: Any) -> str:
@@ -139,7 +139,7 @@ def rerun(
         said = "The same bits as in the campaign."
         if again.differs:
             names = ", ".join(again.differs[:4])
-            said = f"[red]Other bits than in the campaign; another machine may have flown it: {names}[/red]"
+            said = f"[red]Bits differ from the campaign, which another machine may have flown: {names}[/red]"
         console.print(said, soft_wrap=True)
         print_results(page)
         painter.finish()

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 RunFile = Annotated[Path, typer.Argument(metavar="RUN", help="a run.nc, or the folder of one")]
 Epoch = Annotated[
-    str | None, typer.Option(help="UTC at the start of the run; else the scenario's, else 2000-01-01T12:00:00")
+    str | None, typer.Option(help="UTC at the start of the run; by default the scenario's, else 2000-01-01T12:00:00")
 ]
 ObjectName = Annotated[str, typer.Option("--object", help="name of the spacecraft")]
 ObjectId = Annotated[str, typer.Option("--id", help="its international designator")]
-Frame = Annotated[str, typer.Option(help="EME2000 (axes of date are rotated to it), or the inertial axes' name")]
+Frame = Annotated[str, typer.Option(help="EME2000 (axes of date are rotated to it), or the name of the inertial axes")]
 app = typer.Typer(help="Write a law as flight code, a run, or requirements.", no_args_is_help=True, rich_markup_mode=None)
 
 
@@ -57,7 +57,7 @@ def aem(
     object_name: ObjectName = "SPACECRAFT",
     object_id: ObjectId = "0000-000A",
     frame: Frame = "EME2000",
-    version: Annotated[str, typer.Option(help="of the message, 1.0 or 2.0")] = "2.0",
+    version: Annotated[str, typer.Option(help="version of the message, 1.0 or 2.0")] = "2.0",
     force: Force = False,
 ) -> None:
     """Write the attitudes of a run as a CCSDS attitude ephemeris message."""
@@ -73,7 +73,7 @@ def oem(
     object_name: ObjectName = "SPACECRAFT",
     object_id: ObjectId = "0000-000A",
     frame: Frame = "EME2000",
-    center: Annotated[str, typer.Option(help="the body that is orbited")] = "EARTH",
+    center: Annotated[str, typer.Option(help="the central body")] = "EARTH",
     force: Force = False,
 ) -> None:
     """Write the orbit of a run as a CCSDS orbit ephemeris message."""
@@ -102,7 +102,7 @@ def link(
 
 
 def _write(function: str, given: Path | str, output: Path, force: bool, **words: Any) -> None:
-    """Write a file by a function of the Python interface, and print what it returns."""
+    """Write a file by a function of the Python interface and print its result."""
     from starhold import api
     from starhold.cli.console import console
 
@@ -122,7 +122,7 @@ def requirements(
     file: ScenarioFile,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="a .csv or .reqif file to write")],
     original: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="a .reqif file to update: what did not change is kept")
+        Path | None, typer.Option(metavar="FILE", help="a .reqif file to update; unchanged content is kept")
     ] = None,
     force: Force = False,
 ) -> None:
@@ -131,7 +131,7 @@ def requirements(
 
 
 def print_exported(exported: Exported, folder: Path) -> None:
-    """Print the files, the cost of a step, what is proved, and how to test the code."""
+    """Print the files, the cost of a step, the proved claims, and how to test the code."""
     from rich.markup import escape
 
     from starhold.cli.console import console

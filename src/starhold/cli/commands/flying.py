@@ -84,17 +84,17 @@ def _fly(
     nested: bool,
     process: str | None = None,
 ) -> list[Flight]:
-    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own. Where a
-    process gives the commands, nothing is proved or timed."""
+    """Fly one law of a file (by default the first) or, if nested, all laws, each into its own folder. Nothing is proved or
+    timed where a process gives the commands."""
     if proof and not certify:
         raise InputError("compare" if nested else "run", "--proof", "--no-certify too", "one of the two")
     from starhold.report.painter import Painter
 
-    # Its library loads while the scenario is read and laws fly.
+    # The plotting library loads while the scenario is read and laws fly.
     with Painter(pictures is Drawn.ALL) as painter:
         from starhold.scenario.reading import load
 
-        # Read before the modules that fly and print are loaded, so that its errors are reported at once.
+        # Read before the modules that fly and print are loaded, so that errors in it are reported at once.
         scenario = load(file, allow_unstable)
         from starhold.cli.console import console
         from starhold.cli.show import flying, print_outcome, print_results
@@ -125,7 +125,7 @@ def _fly(
                     try:
                         flights.append(studies.fly_law(scenario, entry, loop, notice, process))
                     except CutShortError as error:
-                        # Nothing that was flown is lost.
+                        # The recording so far is kept.
                         if error.recording is not None:
                             write_run(error.recording, folder / "run.nc")
                             console.print(f"Recording so far: {folder / 'run.nc'}", soft_wrap=True, markup=False)
@@ -144,7 +144,7 @@ def _fly(
                     console.print(said, soft_wrap=True, markup=False)
                 painter.draw(scenario, flights, folder)
             finally:
-                # The table does not wait for it, and no flight is lost if it fails.
+                # The table does not wait for the figures, and no flight is lost if drawing fails.
                 keep(flights[-1])
 
         if certify and process is None:

@@ -50,7 +50,7 @@ def parts(
         str | None, typer.Argument(metavar="ROLE|NAME|FILE", help="a role, a part's name, or a Python file that holds one")
     ] = None,
 ) -> None:
-    """List the parts that a loop can be made of, those of one role, or describe one."""
+    """List all parts for loops, those of one role, or describe one."""
     from starhold.cli.show import print_blocks
     from starhold.laws.catalogue import Law
     from starhold.parts import catalogue as installed
@@ -101,7 +101,7 @@ def check_part(part: Checked) -> None:
 
 
 def _laws() -> dict[str, dict[str, Law]]:
-    """List the laws by the bodies that they control."""
+    """Return the laws by the bodies that they control."""
     from starhold.laws.catalogue import catalogue
     from starhold.parts.catalogue import parts as installed
 
@@ -109,7 +109,7 @@ def _laws() -> dict[str, dict[str, Law]]:
 
 
 def _find(given: str) -> Part:
-    """The part or the law of this name or in this file."""
+    """Return the part or the law of this name or in this file."""
     from starhold.conformance.parts import find_part
     from starhold.conformance.suite import find_law
     from starhold.parts import catalogue as installed
@@ -126,7 +126,7 @@ def _find(given: str) -> Part:
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    """A table of unformatted text."""
+    """Return a table of unformatted text."""
     from rich.markup import escape
 
     return Table([*map(Column, heads)], [[*map(escape, row)] for row in rows])
@@ -138,7 +138,7 @@ def _row(part: Part) -> tuple[str, str, str, str]:
 
 
 def _law_blocks(law: Law) -> list[Block]:
-    """A law's card, gains and design forms."""
+    """Return a law's card, gains and design forms."""
     card = law.card
     claim = "no stability; assumes" if card.claims == "none" else f"{card.claims} asymptotic stability, if"
     claims = f"Claims: {claim}: {'; '.join(card.assumptions)}"
@@ -148,7 +148,7 @@ def _law_blocks(law: Law) -> list[Block]:
 
 
 def _part_blocks(part: Part) -> list[Block]:
-    """The card of a part, its parameters and what it records."""
+    """Return a part's card, parameters and recorded quantities."""
     from starhold.algebra.quantity import quantities
 
     card = part.card
@@ -168,7 +168,7 @@ def _part_blocks(part: Part) -> list[Block]:
 
 
 def _field_blocks(title: str, fields: Iterable[Field]) -> list[Block]:
-    """Parameters with their units, bounds and defaults under a title."""
+    """Return parameters with their units, bounds and defaults under a title."""
     rows: list[tuple[str, ...]] = []
     for item in fields:
         gain = item.gain

@@ -59,7 +59,8 @@ def certify(
 def check(
     path: Annotated[Path, typer.Argument(metavar="CERT", help="a certificate.json")],
     law_file: Annotated[
-        list[Path] | None, typer.Option("--law-file", metavar="FILE", help="a file with a law that it names; repeatable")
+        list[Path] | None,
+        typer.Option("--law-file", metavar="FILE", help="a file with a law that the certificate names; repeatable"),
     ] = None,
     scenario: Annotated[
         str | None,
@@ -68,8 +69,8 @@ def check(
         ),
     ] = None,
 ) -> None:
-    """Check a certificate independently of the program that made it: it takes from the file only what is claimed. The
-    kernel, which is also in kernel.pyz beside the file, checks the proofs; other claims are undecided.
+    """Check a certificate independently of the program that made it; only the claims are taken from the file. The kernel,
+    which is also in kernel.pyz beside the file, checks the proofs; other claims are undecided.
     """
     import hashlib
     from contextlib import ExitStack

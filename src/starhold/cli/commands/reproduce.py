@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from starhold.publications.reproduction import Reproduction
 
 LONGEST_FIRST = "BEDCA"
-"""The order in which they are started, so that no process works alone for long."""
+"""The order in which publications are started, so that no process works alone for long."""
 
 
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="[A|B|C|D|E|all]", help="which publication")] = "all",
     output: ReproductionOutput = None,
     force: Force = False,
-    processes: Annotated[int | None, typer.Option(min=1, help="in parallel; all cores by default")] = None,
+    processes: Annotated[int | None, typer.Option(min=1, help="processes in parallel; all cores by default")] = None,
 ) -> None:
     """Reproduce every figure, table and number of the publications: a page for each, with verdicts."""
     from starhold.cli.console import console

@@ -14,24 +14,24 @@ def serve(
     file: ScenarioFile,
     law: Annotated[str | None, typer.Option(help="the law whose measurements are sent; by default the first")] = None,
     host: Annotated[
-        str, typer.Option(help="the address on which it listens; any but this machine's is open to the network")
+        str, typer.Option(help="the address to listen on; any other than this machine's is open to the network")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="the port on which it listens; 0: any free one")] = 5750,
+    port: Annotated[int, typer.Option(help="the port to listen on; 0: any free one")] = 5750,
     udp: Annotated[bool, typer.Option("--udp", help="listen on UDP; TCP if not given")] = False,
     zmq: Annotated[bool, typer.Option("--zmq", help="listen on ZeroMQ, as a ROUTER (extra `zmq`)")] = False,
     serial: Annotated[
         str | None, typer.Option(metavar="DEVICE", help="listen on a serial line, such as /dev/ttyUSB0 (extra `serial`)")
     ] = None,
-    baud: Annotated[int, typer.Option(help="of the serial line, 8N1")] = 115200,
+    baud: Annotated[int, typer.Option(help="baud rate of the serial line, 8N1")] = 115200,
     rate: Annotated[
-        float | None, typer.Option(help="real time: how many times faster than the clock; lockstep if not given")
+        float | None, typer.Option(help="fly in real time, at this multiple of the clock's speed; lockstep if not given")
     ] = None,
     missing: Annotated[
-        str, typer.Option(metavar="hold|zero|stop", help="what acts in a period of real time without a command")
+        str, typer.Option(metavar="hold|zero|stop", help="the command in a period of real time without one")
     ] = "hold",
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="folder for run.nc, and how well real time was kept; created"),
+        typer.Option("-o", "--output", metavar="DIR", help="folder for run.nc and the timing in real time; created"),
     ] = None,
     force: Force = False,
     allow_unstable: Unstable = False,
@@ -49,11 +49,11 @@ def serve(
     scenario = load(file, allow_unstable)
 
     def announce(address: str) -> None:
-        # All other refusals come before this line, and nothing has been flown.
+        # All other refusals come before this line, and nothing has been flown yet.
         if output is not None:
             open_folder(output, force)
         console.print(f"Listening on {address}. Ctrl-C ends it.", soft_wrap=True, markup=False)
-        # A program that waits for this line reads a pipe.
+        # Flushed, because a program that waits for this line reads a pipe.
         console.file.flush()
 
     with Live(console=console, auto_refresh=False, transient=True, redirect_stdout=False, redirect_stderr=False) as live:

@@ -16,7 +16,7 @@ CODES = {"missed": REFUTED, "undecided": UNDECIDED}
 
 
 def command_of(name: str) -> Any:
-    """Return the command of this name."""
+    """Return the function of the command of this name, with its options as parameters."""
     declared = command(name)
 
     def run(
@@ -83,7 +83,7 @@ def command_of(name: str) -> Any:
 
 
 def _parameters(declared: Command) -> dict[str, Any]:
-    """The types of a command's arguments and options, in order."""
+    """Return the types of a command's arguments and options, in order."""
     kinds: dict[str, Any] = {}
     if declared.file is not None:
         kind = str if declared.listed is None else str | None
@@ -116,7 +116,7 @@ def _parameters(declared: Command) -> dict[str, Any]:
 
 @contextmanager
 def _progress(declared: Command) -> Iterator[Callable[[int, int, str], None]]:
-    """Show a bar for a command that reports its progress; yield the function that it calls."""
+    """Show a progress bar; yield the function by which a command reports its progress."""
     if declared.doing is None:
         yield lambda done, total, what: None
         return

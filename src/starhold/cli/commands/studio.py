@@ -15,7 +15,7 @@ def studio(
     file: Annotated[
         str | None, typer.Argument(metavar="FILE", help="a scenario file, or the name of a built-in scenario to begin with")
     ] = None,
-    port: Annotated[int, typer.Option(help="on which it listens, on this machine alone; 0: any free one")] = 0,
+    port: Annotated[int, typer.Option(help="the port to listen on, on this machine only; 0: any free one")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page in the browser")] = True,
 ) -> None:
     """Serve a page on this machine: edit a scenario, certify, design, fly and compare, and see results side by side."""

@@ -15,7 +15,7 @@ from ..regions import STATE
 from ..rules import Exceeds, Part, Proof, vanish
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
-from .pointing import HALF_TURN
+from .pointing import HALF_TURN, bounded_motion
 
 ROUNDS, FOLLOWED = 32, 1024
 """The most rounds, and up to how many periods of one are followed one by one."""
@@ -77,25 +77,15 @@ def points_with_appendages(claim: Claim) -> Proof:
     yield "end of the rate", Exceeds(fastest, norm(state[:3]))
     yield "settling", Exceeds(numbers["settling"], motion.h * samples)
 
-    def bounded(name: str) -> str:
-        growing = numbers.get(f"{name}.per.rate")
-        more = f" and {below(growing)} N m s times the rate of the body" if growing else ""
-        return f"of up to {below(numbers[name])} N m{more}"
-
-    misread = [("attitude that it is told", "error.attitude", "rad"), ("rate", "error.rate", "rad/s")]
-    errors = [f"errors of the command {bounded('error')}"]
-    errors += [f"of the {text} of up to {below(x)} {unit}" for text, name, unit in misread if (x := numbers.get(name))]
-    text = (
-        f"every motion from {{V <= {below(numbers['level'])}, q0 > 0}} with states of the appendages of up to"
-        f" {', '.join(map(below, begun_with))} stays in {{V <= {above(numbers['highest'])}}}, and after"
-        f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
-        f" than {above(fastest)} rad/s, with the torque held for {below(motion.h)} s, torques from outside"
-        f" {bounded('outside')} and {enumerated(errors)}"
-    )
+    kinds = [("attitude that it is told", "error.attitude", "rad"), ("rate", "error.rate", "rad/s")]
+    misread = [(text, numbers.get(name) or Fraction(0), unit) for text, name, unit in kinds]
+    more = f" with states of the appendages of up to {', '.join(map(below, begun_with))}"
+    text = bounded_motion(numbers, f"V <= {below(numbers['level'])}, q0 > 0", more, misread)
     for limit, where in zip(limits, ("about any axis", "in norm"), strict=True):
         text += "" if limit is None else f", and the law asks for no more than {above(limit)} N m {where}"
     unlimited = ["unlimited-torque"] * (limits == [None, None])
-    assumed = ["appendages-as-given", "bounded-push", "held-torque", *unlimited, "target-at-rest", "no-wheels"]
+    assumed = ["appendages-as-given", "bounded-push", "held-torque", *unlimited, *loop.untold]
+    assumed += ["target-at-rest", "no-wheels"]
     said = f"; {enumerated(start)}" if start else ""
     # From the start of a round on, motions are turned by no more than in it and in later ones.
     within = [(time, max(turned[k:])) for k, time in enumerate(times)]

@@ -132,8 +132,9 @@ def concluded(loop: AttitudeLoop, said: list[str]) -> Proof:
         said.append("comes to rest on target")
     else:
         demand(level is None or not loop.any_inertia, "a level for every inertia needs a sign of the quaternion")
-        repels = Squares(away - V.at(loop.still), [1 + q[0], *q[1:]], 4, modulo=[loop.sphere])
-        yield "the other equilibrium repels", repels
+        if level is not None:
+            repels = Squares(away - V.at(loop.still), [1 + q[0], *q[1:]], 4, modulo=[loop.sphere])
+            yield "the other equilibrium repels", repels
         said.append("comes to rest on target, but for a set of measure zero, which ends on the other quaternion")
     return (yield from finished(loop, said, loop.sign_assumed))
 

@@ -87,6 +87,9 @@ def opposes_change(loop: AttitudeLoop) -> Shown:
     """Where there is a field b the law remembers it, and its torque is m x b with m = -k (b - b before)/(period |b|^2), or
     none at the first measurement, before which no field is known."""
     b, before, subject = variables("b"), variables("m"), loop.claim.subject
+    # Of what else a law may be told a loop that is taken with nothing has less than one that flies.
+    fields = {name.rpartition(".")[0] for name in loop.claim.programs["law"].inputs if name.startswith("measurement.")}
+    demand(fields <= {"measurement", "measurement.magnetic_field"}, "the law is told of more than the field")
     square, gain = dot(b, b), -subject["gains.k"] / subject["measurement.period"]
     for name, known in (("first torque", 0), ("torque", 1)):
         outputs = loop.read("law", 7, wired("memory.field", before) | {"memory.known": poly(known)})

@@ -9,7 +9,7 @@ from fractions import Fraction
 from ..held import Held
 from ..loops import AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
-from ..reading import Claim
+from ..reading import Claim, Numbers
 from ..regions import ANGLE, AT_REST, RATE, TURN, as_told, balls, widened
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
@@ -78,12 +78,11 @@ def points(claim: Claim) -> Proof:
     for k, one in enumerate(ellipsoids):
         shape, parts, *rest = read_table(one, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
-        free = 1 - sum(shares)
+        free = 1 - sum(shares, Fraction(0))
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
-        pushed = motion.linear(tube)
+        left = plus([[rate * x for x in row] for row in X], spread(shares, motion.linear(tube)), -1)
         for corner, A in enumerate(corners):
-            after = image(X, shares, A, pushed)
-            yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
+            yield f"ellipsoid {k} {corner}", Definite(plus(left, times(A, times(X, transpose(A))), Fraction(-1) / free))
         yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(tube.region.X, away), -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
@@ -108,26 +107,14 @@ def points(claim: Claim) -> Proof:
         yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in last[part]], -1))
     yield "settling", Exceeds(numbers["settling"], h * samples)
 
-    def most(name: str) -> str:
-        growing = motion.per_rate[name]
-        more = f" and {below(growing)} N m s times the rate of the body" if growing else ""
-        return f"of up to {below(numbers[name])} N m{more}"
-
-    errors = [f"errors of the command {most('error')}"]
-    kinds = [("attitude that it is told", motion.turned, "rad"), ("rate", motion.rated, "rad/s")]
-    kinds += [("target's rate", motion.led, "rad/s"), ("target's acceleration", motion.hurried, "rad/s2")]
-    errors += [f"of the {name} of up to {below(x)} {unit}" for name, x, unit in kinds if x]
-    begun = below(numbers["level"]) + ", q0 > 0" * motion.even
-    text = (
-        f"every motion from {{V <= {begun}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
-        f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
-        f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside"
-        f" {most('outside')} and {enumerated(errors)}"
-    )
+    misread = [("attitude that it is told", motion.turned, "rad"), ("rate", motion.rated, "rad/s")]
+    misread += [("target's rate", motion.led, "rad/s"), ("target's acceleration", motion.hurried, "rad/s2")]
+    text = bounded_motion(numbers, "V <= " + below(numbers["level"]) + ", q0 > 0" * motion.even, "", misread)
     text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
     text += f", with every J_ik off by up to {below(numbers['tolerance'])} sqrt(J_ii J_kk)" if motion.off else ""
     text += f", {planned}" * bool(planned)
     text += "".join(f", {name} of up to {below(x)}" for name, x in motion.bounded.items()) + noise.text
+    text += ", momentum being that with the inertia as given" * bool(motion.off and loop.wheels)
     assumed = [
         "rigid-body",
         "inertia-near" if motion.off else "inertia-as-given",
@@ -137,16 +124,37 @@ def points(claim: Claim) -> Proof:
         *limited.assumptions,
     ]
     assumed += ["best-plan"] * bool(planned)
-    assumed += ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
+    assumed += loop.untold + ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
     said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
     return Statement(text + said, tuple(dict.fromkeys(assumed)), "pointing", within=tuple(within))
 
 
-def image(X: Rows, shares: Sequence[Fraction], A: Rows, pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:
-    """Return the matrix of an ellipsoid that holds Ax + the sum of B v, of x.X^-1 x <= 1 and |v| <= b."""
-    grown = [[entry / (1 - sum(shares)) for entry in row] for row in times(A, times(X, transpose(A)))]
+def bounded_motion(numbers: Numbers, begun: str, more: str, misread: Sequence[tuple[str, Fraction, str]]) -> str:
+    """Return what a claim says of motions from a set while the torque is held. misread: of what the law is told its name, by
+    how much it is off at most, and the unit of that."""
+
+    def most(name: str) -> str:
+        growing = numbers.get(f"{name}.per.rate")
+        return f"of up to {below(numbers[name])} N m" + (
+            f" and {below(growing)} N m s times the rate of the body" if growing else ""
+        )
+
+    errors = [f"errors of the command {most('error')}"]
+    errors += [f"of the {name} of up to {below(x)} {unit}" for name, x, unit in misread if x]
+    return (
+        f"every motion from {{{begun}}}{more} stays in {{V <= {above(numbers['highest'])}}}, and after"
+        f" {above(numbers['settling'])} s it is at all times within {above(numbers['end.angle'])} rad of the target and"
+        f" turns no faster than {above(numbers['end.rate'])} rad/s, with the torque held for {below(numbers['period'])} s,"
+        f" torques from outside {most('outside')} and {enumerated(errors)}"
+    )
+
+
+def spread(shares: Sequence[Fraction], pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:
+    """Return what the sum of B v, |v| <= b, adds to the matrix AXA' / (1 - the sum of shares) of an ellipsoid that holds
+    Ax + that, of x.X^-1 x <= 1."""
+    grown = scalar(0, 6)
     for (B, b), share in zip(pushes, shares, strict=True):
         grown = plus(grown, times(B, transpose(B)), b * b / share)
     return grown

@@ -1,2 +1,2 @@
-"""Each publication has a folder: `paper.toml` says what it prints and who measures it, scenario files hold the flights,
-and modules compute what no scenario holds."""
+"""The publications, each in a folder: `paper.toml` lists what it prints with the measure of each item, scenario files define
+the flights, and modules compute everything else."""

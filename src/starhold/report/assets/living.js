@@ -237,11 +237,11 @@ function rank() {
 
 function standing(claim) {
   const gains = living.dials.find((dial) => dial.law === claim.law && isMoved(dial.key));
-  if (gains) return { fails: `${gains.label} is another` };
+  if (gains) return { fails: `${gains.label} has changed` };
   if (dials.has(KNOWN)) {
-    if (!claim.known && isMoved(KNOWN)) return { fails: "the law knows another inertia" };
+    if (!claim.known && isMoved(KNOWN)) return { fails: "the law's nominal inertia has changed" };
     if (isMoved(TRUE)) {
-      if (claim.true === "given") return { fails: "the inertia is another" };
+      if (claim.true === "given") return { fails: "the inertia has changed" };
       if (claim.true === "any") return { holds: "proved for every inertia that the law does not know" };
       const inside = inBox(claim);
       if (!inside) return { fails: `the inertia is outside the box of ${general(100 * claim.tolerance, 3)} %` };
@@ -250,12 +250,12 @@ function standing(claim) {
   }
   const limit = "spacecraft.torque_limit";
   if (dials.has(limit) && isMoved(limit) && claim.limit !== "any") {
-    if (claim.limit === "given" || valueOf(limit) < dials.get(limit).value) return { fails: "the torque limit is another" };
-    return { holds: "the torque limit is no smaller" };
+    if (claim.limit === "given" || valueOf(limit) < dials.get(limit).value) return { fails: "the torque limit has changed" };
+    return { holds: "the torque limit has not decreased" };
   }
   const begun = ["initial.attitude", "initial.rate"].some((key) => dials.has(key) && isMoved(key));
-  if (begun && !claim.momentum) return { fails: "the angular momentum at the start is another" };
-  if (begun && claim.start !== null) return { holds: "whether this start lies in its set is not looked at here" };
+  if (begun && !claim.momentum) return { fails: "the initial angular momentum has changed" };
+  if (begun && claim.start !== null) return { holds: "whether its set contains this start is not checked here" };
   return {};
 }
 
@@ -278,7 +278,7 @@ function claims() {
       box.querySelector(".what").append(why);
     }
     const outcome = box.querySelector(".outcome").textContent;
-    why.textContent = fails ? `Of the file's numbers, not of these: ${fails}.` : holds ? `Still ${outcome}: ${holds}.` : "";
+    why.textContent = fails ? `This applies to the file's numbers, not to these: ${fails}.` : holds ? `Still ${outcome}: ${holds}.` : "";
   }
   document.body.classList.toggle("moved", living.dials.some((dial) => isMoved(dial.key)));
 }
@@ -304,7 +304,7 @@ function refusal() {
     const range = living.ranged[dial.key];
     const beyond = (x, k) => x > flatten(dial.value).map(Math.abs)[k] * range * 1.001 || x < flatten(dial.value).map(Math.abs)[k] / range / 1.001;
     const diagonal = (k) => sizes.length !== 9 || k % 4 === 0;
-    if (range && sizes.some((x, k) => diagonal(k) && beyond(x, k))) return `${told(dial)}: only up to ${range} times the file's, or down to 1/${range}: beyond, a law may refuse it by a check that this page does not have`;
+    if (range && sizes.some((x, k) => diagonal(k) && beyond(x, k))) return `${told(dial)}: only up to ${range} times the file's, or down to 1/${range}: beyond this a law may refuse it by a check that the page does not have`;
   }
   for (const [place, { keys, refusals }] of living.asked.entries()) {
     const found = new Float64Array(1 + Math.max(...refusals.flatMap(([flag, words]) => [flag, ...words.map((word) => word[0]).filter(Number.isInteger)])));

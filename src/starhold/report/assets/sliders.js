@@ -161,7 +161,7 @@ function words() {
   const flying = fates.filter((found) => found.flies).length;
   const staying = fates.map((found, number) => [number, found.stays]).filter(([, why]) => why);
   document.getElementById("staying").innerHTML = staying.map(([number, why]) => `<p><b>${plain(lawOf(number))}</b> stays as the file has it. ${plain(why)}.</p>`).join("");
-  document.getElementById("followed").textContent = flying ? "Plots, ranking, views and claims are of the sliders." : "Plots, ranking, views and claims are of the file.";
+  document.getElementById("followed").textContent = flying ? "Plots, ranking, views and claims refer to the slider values." : "Plots, ranking, views and claims refer to the file's values.";
 }
 
 function group(title, list) {
@@ -177,7 +177,7 @@ function group(title, list) {
       box.append(row(slider));
       if (!laws.length) slider.field.disabled = slider.slide.disabled = true;
     }
-    const told = held.length && laws.length ? `${held.map(([name]) => name).join(", ")} cannot follow: ${held[0][1]}.` : held.length ? `Cannot be moved here: ${held[0][1]}.` : "";
+    const told = held.length && laws.length ? `${held.map(([name]) => name).join(", ")} cannot follow: ${held[0][1]}.` : held.length ? `Cannot be changed here: ${held[0][1]}.` : "";
     const note = document.createElement("p");
     note.className = "why";
     note.textContent = told;
@@ -192,7 +192,7 @@ function knowing() {
   const box = document.createElement("label");
   box.className = "knowing";
   box.innerHTML = '<input type="checkbox" id="known" checked> the laws know it';
-  box.title = "Off: the laws keep the file's inertia, as after a fault at the start that nobody noticed; the angular momentum is as before";
+  box.title = "Off: the laws keep the file's inertia, as after an undetected fault at the start; the angular momentum is unchanged";
   box.querySelector("input").addEventListener("change", ({ target }) => {
     const value = valueOf(keyOf({ key: KNOWN }));
     lawsKnow = target.checked;

@@ -17,21 +17,21 @@ if TYPE_CHECKING:
 
 
 def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
-    """Draw a figure of each recorded quantity, with the names, units and meanings that the body's part declares."""
+    """Return a figure of each recorded quantity, with the names, units and meanings that the body's part declares."""
     times, plots = collect(flights, POINTS)
     shown = without_runs(flights)
     return {plot.name: partial(over_time, plot, times, (), shown, scenario.name) for plot in plots}
 
 
 def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-    """Make plots over time of all recorded quantities."""
+    """Return the parts of the page: plots over time of all recorded quantities."""
     times, plots = collect(flights, PAGE_POINTS)
     return PageParts({"times": rounded(times), "plots": [over_time_data(plot, flights) for plot in plots]})
 
 
 def collect(flights: Sequence[Flight], points: int) -> tuple[Curve, list[Plot]]:
-    """Return times and a plot of each quantity that all flights record, a panel for each component; thinned to about
-    `points`."""
+    """Return times and a plot of each quantity that all flights record, with a panel per component, thinned to about
+    `points` samples."""
     longest = max((flight.recording["time"] for flight in flights), key=len)
     factor = thinning(len(longest), points)
     return thin_times(longest, factor), recorded_plots(flights, factor)

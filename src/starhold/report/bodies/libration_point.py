@@ -26,7 +26,7 @@ FRAMES = 1200
 SECONDS = 30.0
 """The duration of the animation."""
 TURNS = 10.0
-"""The most revolutions of the two bodies that are played; the views leave out the rest."""
+"""The largest number of revolutions of the two bodies shown in the animation."""
 
 _VIEWS = (
     "The path in the axes that rotate with the two bodies. Dashed: the circle to be held; line: the X axis, which leads "
@@ -36,7 +36,7 @@ _VIEWS = (
 
 
 def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
-    """Draw the projections, the path in space, the phase portrait and the plots over time."""
+    """Return the figures: projections, path in space, phase portrait and plots over time."""
     plots, shown, name = collect(flights, POINTS, scenario), without_runs(flights), scenario.name
     figures: Picture = {plot.name: partial(over_time, plot, plots.times, (), shown, name) for plot in plots.over_time}
     figures |= {plot.name: partial(draw_planes, plot, shown, name) for plot in plots.planes}
@@ -44,7 +44,8 @@ def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
 
 
 def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-    """Show the path in planes and in space, with the circle or point held, and the control over time."""
+    """Return the parts of the page: the path in planes and in space, with the circle or point held, and the control over
+    time."""
     plots = collect(flights, PAGE_POINTS, scenario)
     scene, (lead, *rest) = _scene(scenario, flights, plots), plots.over_time
     drawn = [*first_alone(lead), *rest]
@@ -95,7 +96,7 @@ def _size(plots: PathPlots, flights: Sequence[Flight]) -> float:
 
 
 def _units(scenario: Scenario) -> list[tuple[str, str]]:
-    """State the physical units of the scaled numbers in the settings."""
+    """Return the physical units of scaled numbers, for the settings."""
     units, plant = scenario.table.libration.units, scenario.craft
     pair = scenario.table.libration.pair
     return [

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 FRAMES = 180
 """The number of attitudes of the animated body; the page interpolates smoothly between them."""
 EARLY_POINTS = 900
-"""The number of samples of a curve of the transient alone."""
+"""The number of samples of a curve that shows only the transient."""
 EARLY = 1.6
 """Frame k of n shows the time T (k/n)^EARLY, because most of the motion is at the start. Where a run is much longer than its
 transient, half of the frames show the transient."""
@@ -58,7 +58,7 @@ _ORBITAL = (
 
 
 def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
-    """Draw the attitude over time, the steps to an accuracy, and angle and torque of a short transient alone."""
+    """Return the figures: attitude over time, steps to each accuracy, and angle and torque during a short transient."""
     plots, shown, name = collect(flights, POINTS, scenario), without_runs(flights), scenario.name
     drawn = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, plots.roll_pitch_yaw, *plots.further)
     more = plots.marks, shown, name, plots.shaded
@@ -73,8 +73,8 @@ def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
 
 
 def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-    """Show the attitude over time, and the body as a rotating box."""
-    # It loads much of SciPy, which the figures, made before the table is printed, do not need.
+    """Return the parts of the page: the attitude over time, and the body as a rotating box."""
+    # Imported here, because it loads much of SciPy, which the figures do not need.
     from starhold.report.linear_loop import section
 
     plots, end = collect(flights, PAGE_POINTS, scenario), early(flights)
@@ -103,10 +103,10 @@ def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
 
 
 def _limits(flights: Sequence[Flight], scenario: Scenario) -> str:
-    """State which limit each flight comes closest to."""
+    """Return HTML that states to which limit each flight comes closest."""
     closest = [(number, *closest_limit(flight, scenario)) for number, flight in enumerate(flights)]
     said = "".join(f"<span>{swatch(number)}{name} {100.0 * share:.3g} %</span>" for number, share, name in closest if name)
-    return f'<p class="best-at of-file"><strong>Of torque and wheels, closest to a limit</strong>{said}</p>' if said else ""
+    return f'<p class="best-at of-file"><strong>Closest to a limit of torque or wheels</strong>{said}</p>' if said else ""
 
 
 def _simplification(scene: Mapping[str, Any]) -> str:
@@ -118,7 +118,7 @@ def _drawn(plots: AttitudePlots, flights: Sequence[Flight], scenario: Scenario) 
     """Return the plots over time for the script, beginning with the error that the laws control."""
     (angle, speed), of_angle = plots.angle.panels, replace(plots.angle, title="error angle")
     lead = [replace(of_angle, panels=[angle]), replace(of_angle, name="speed", title="relative rate", panels=[speed])]
-    # Where every attitude is within its tolerance, the rate is what counts.
+    # Where every attitude is within its tolerance, the rate comes first.
     if scenario.table.settling.attitude_tolerance >= math.pi:
         lead.reverse()
     quaternion = Plot("quaternion", "error quaternion", [*plots.scalar.panels, *plots.attitude.panels])
@@ -127,7 +127,7 @@ def _drawn(plots: AttitudePlots, flights: Sequence[Flight], scenario: Scenario) 
 
 
 def _happenings(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
-    """Mark faults, reactions to them, and modes: as bands of time where only one law has them, else where they begin."""
+    """Return the marks of faults, reactions and modes: bands of time where only one law has them, else their beginnings."""
     struck = {fault.time for fault in scenario.table.fault}
     marks = [(time, "fault" if time in struck else "acted on") for time in fault_times(scenario)]
     moded = [flight for flight in flights if flight.modes]
@@ -202,7 +202,7 @@ def _box(inertia: Any) -> tuple[Any, Any]:
         moments, axes = full, np.eye(3)
     else:
         moments, axes = np.linalg.eigh(full)
-        # The library may return either sign; a picture should be the same everywhere.
+        # The library may return either sign, but the picture should be the same everywhere.
         axes = axes * np.where(np.take_along_axis(axes, np.abs(axes).argmax(axis=0)[None], axis=0)[0] < 0.0, -1.0, 1.0)
         axes[:, 2] *= np.sign(np.linalg.det(axes))
     edges = np.sqrt(np.maximum(moments.sum() - 2.0 * moments, 0.0))

@@ -1,5 +1,5 @@
-"""Commands that declare their results, each in a file of its own name with a `COMMAND`. The command line and the Python
-interface offer every command of this folder, the studio those about a scenario."""
+"""Commands that declare their results; each file has the name of its command and defines a `COMMAND`. The command line and
+the Python interface offer every command of this folder, the studio those about a scenario."""
 
 from __future__ import annotations
 
@@ -24,18 +24,17 @@ OUTCOMES = {
     **dict.fromkeys(("not checked", "not proved", "not sought"), "yellow"),
     **dict.fromkeys(("not claimed", "does not apply"), "dim"),
 }
-"""The colour of each outcome: good, bad, open or of no account."""
+"""The colour of each outcome: good, bad, undecided or not applicable."""
 
 
 def coloured(outcome: str, text: str = "") -> str:
-    """Return an outcome, or a text in its place, with the style marks of its colour; a text alone where it has none."""
+    """Return an outcome, or a text in its place, with the style marks of the outcome's colour, if it has one."""
     colour = OUTCOMES.get(outcome)
     return f"[{colour}]{text or outcome}[/{colour}]" if colour else text
 
 
 class Column(NamedTuple):
-    """A column of a table: its heading, the unit below it, the format of its numbers (without one it holds words), and what
-    it means."""
+    """A column of a table: its heading, the unit below it, the format of its numbers ("" for words), and its meaning."""
 
     name: str
     unit: str = ""
@@ -46,8 +45,8 @@ class Column(NamedTuple):
 class Cell(NamedTuple):
     """Styled text in a table. kind: "law", in the colour of the law of this number; "name", which names its row, with detail
     below it; an outcome, such as "met" or "missed"; "best" of its column; "typed", to be copied; "section", a link to the
-    section of a document that detail names; "share", with a bar of this share of the column below it; "shade", in the colour
-    that detail names, the stronger the farther the number is from 0; for any other kind detail explains the text.
+    section of a document that detail names; "share", with a bar below it for this share of the column's width; "shade", in
+    the colour that detail names, whose strength depends on the number; for any other kind detail explains the text.
     """
 
     text: str
@@ -70,7 +69,7 @@ class Table(NamedTuple):
     ends: Collection[int] = ()
 
     def heads(self) -> list[str]:
-        """The headings, each with its unit."""
+        """Return the headings, each with its unit."""
         return [f"{column.name} ({column.unit})" if column.unit else column.name for column in self.columns]
 
     def texts(self) -> list[list[str]]:
@@ -85,7 +84,7 @@ class Table(NamedTuple):
 
 
 class Heading(NamedTuple):
-    """A highlighted name, and the text that follows it in its line."""
+    """A highlighted name, and the text that follows it on the same line."""
 
     name: str
     rest: str = ""
@@ -96,10 +95,10 @@ Block: TypeAlias = Table | Heading | str
 
 
 class Result(NamedTuple):
-    """A study gives this. blocks: for reading, in order. What there is no file of is None: numbers, all that it computed, SI
-    and radians, are for NAME.csv; figure makes the figure of NAME.png with the plotting library; summary, by law, is for
-    summary.json; xml is the text of NAME.xml, toml that of NAME.toml; certificate writes one; document is for NAME.html and
-    NAME.md. outcome: whether all that is required is met, or proved."""
+    """The result of a study. blocks: text and tables to read, in order. The others are contents of files, or None: numbers,
+    everything computed in SI and radians, for NAME.csv; figure, a function that draws NAME.png; summary, by law, for
+    summary.json; xml and toml, the texts of NAME.xml and NAME.toml; certificate, a function that writes one; document, for
+    NAME.html and NAME.md. outcome: whether everything required is met, or proved."""
 
     title: str
     blocks: Sequence[Block]
@@ -116,8 +115,8 @@ class Result(NamedTuple):
 class Option(NamedTuple):
     """An option of a command. key: the scenario key whose value it replaces, a whole number if `whole`, else a time; "" for
     a text that `read` takes. file: "csv" or "png" for an option that names the file of the numbers or of the figure.
-    content: turns the text into what `study` takes after the law; that is None without the option. argument: its name in
-    the help if it is a required argument after FILE instead of an option."""
+    content: a function that converts the text to an argument of `study` after the law, which is None without the option.
+    argument: its name in the help if it is a required argument after FILE instead of an option."""
 
     key: str
     help: str
@@ -129,7 +128,7 @@ class Option(NamedTuple):
 
 
 def number_or_text(value: str | float) -> str | float:
-    """Return a value as a scenario file would hold it: a number, in SI, if the text is one."""
+    """Return a value as in a scenario file: a number, in SI, if the text is one."""
     try:
         return float(value) if isinstance(value, str) else value
     except ValueError:
@@ -137,7 +136,7 @@ def number_or_text(value: str | float) -> str | float:
 
 
 def as_given(text: str) -> str:
-    """Return a text unchanged: what reads an option that is no key and names no file."""
+    """Return a text unchanged; the `content` of an option that is neither a key nor the name of a file."""
     return text
 
 
@@ -148,15 +147,15 @@ def later(path: str, **more: Any) -> Callable[..., Any]:
 
 
 class Command(NamedTuple):
-    """A command about a law of a scenario, or about another subject that `read` returns. summary: what it does, in a
-    sentence. suffix: results go to SUBJECT-suffix; "" if none are written by default. study: computes from a scenario, a law
-    and, if `doing` is set, a callback that takes the number done, the total and the next item ("" at the end). present:
-    makes the Result from these and what was computed. pick: returns the law for a name or None; InputError if it cannot be
-    studied. law: help for --law. doing: label of the progress bar. unstable: whether there is --allow-unstable. body: the
-    body that scenarios must have, "" for any. file: help for FILE, None for a command without one; listed: what is shown
-    without FILE, if that is allowed. read: returns the subject in place of a scenario and a law, from FILE and options.
-    proofs: whether a certificate is written, and so whether there is --rocq. kinds: suffixes of the files NAME.*. prove: the
-    study together with a proof of the pointing, where there is --proof. check: takes the arguments of study, and refuses
+    """A command about a law of a scenario, or about another subject that `read` returns. summary: its purpose in a sentence.
+    suffix: results go to SUBJECT-suffix; "" if none are written by default. study: computes the numbers from a scenario, a
+    law and, if `doing` is set, a callback that takes the number done, the total and the next item ("" at the end). present:
+    makes the Result from these arguments and the numbers. pick: returns the law for a name or None; InputError if it cannot
+    be studied. law: help for --law. doing: label of the progress bar. unstable: whether --allow-unstable exists. body: the
+    body that scenarios must have, "" for any. file: help for FILE, None for a command without one; listed: returns the
+    blocks shown without FILE, if that is allowed. read: returns the subject in place of a scenario and a law, from FILE and
+    options. proofs: whether a certificate is written and --rocq exists. kinds: suffixes of the files NAME.*. prove: the
+    study together with a proof of the pointing bound, if --proof exists. check: takes the arguments of study and refuses
     files that they name before a folder for results is opened.
     """
 
@@ -196,20 +195,20 @@ class Command(NamedTuple):
 
     @property
     def arguments(self) -> list[str]:
-        """The names of what has to follow FILE."""
+        """The names of the required arguments after FILE."""
         return [name for name, option in self.options.items() if option.argument]
 
     @property
     def offered(self) -> bool:
-        """Whether it needs no more than a scenario."""
+        """Whether the command needs no argument but a scenario."""
         return self.read is None and not self.arguments
 
     def studying(self, proof: bool) -> Callable[..., Any]:
-        """Return the function that computes, together with the proof if requested."""
+        """Return the function that computes the study, with the proof if requested."""
         return self.prove if proof and self.prove is not None else self.study
 
     def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None], proof: bool = False) -> Result:
-        """Study the arguments from `prepare`, and present the result; proof: use `prove`."""
+        """Return the presented result of a study of the arguments from `prepare`; proof: whether to use `prove`."""
         study = self.studying(proof)
         if self.doing is None:
             return self.present(*subject, study(*subject))

@@ -1,4 +1,4 @@
-"""The command `budget`: the pointing error by source."""
+"""The command `budget`, the pointing error by source."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from starhold.studies.budget import Budget
 UNITS = (("deg", math.radians(1.0)), ("arcsec", math.radians(1.0 / 3600.0)), ("mas", math.radians(1.0 / 3.6e6)))
 LEAST = 0.1
-"""The unit of an index is such that its largest level is at least this."""
+"""The unit of an index is chosen such that its largest level is at least this."""
 SMALL = 1e-4
-"""Levels below this share of the largest of their panel are shown as nothing."""
+"""Levels below this share of the largest in their panel have no bar."""
 SHARES = "The column proved shows this bound, and by how much it decreases without a source; — where it does not change."
 INTERPRETED = {
     "mixed": "of all instants of all runs",
@@ -24,7 +24,7 @@ INTERPRETED = {
 
 
 def present(scenario: Scenario, entry: LawEntry, budget: Budget) -> Result:
-    """One row a source, one column an index."""
+    """Return the result: a table with a row per source and a column per index."""
     from starhold.analysis.pointing import MEANINGS, Figures
 
     records = budget.records()
@@ -69,17 +69,17 @@ def _table(budget: Budget) -> Table:
 
 
 def _unit_of(budget: Budget, index: str) -> tuple[str, float]:
-    """Return the unit in which the levels of an index are shown, and its size (rad)."""
+    """Return the unit in which the levels of an index are shown, and its value in rad."""
     return _fitting(max(budget.level(row.name, index) for row in budget.rows))
 
 
 def _fitting(largest: float) -> tuple[str, float]:
-    """Return the unit in which an angle (rad) is shown, and its size (rad)."""
+    """Return the unit in which an angle (rad) is shown, and its value in rad."""
     return next((unit for unit in UNITS if largest >= LEAST * unit[1]), UNITS[-1])
 
 
 def _setting_text(budget: Budget) -> str:
-    """State how the errors were sampled, in a sentence or two."""
+    """Return one or two sentences on the sampling of errors."""
     settings = budget.settings
     about = "about any axis" if settings.boresight is None else "half the cone of the line of sight"
     runs = "run" if settings.runs == 1 else "runs"
@@ -91,7 +91,7 @@ def _setting_text(budget: Budget) -> str:
 
 
 def draw(budget: Budget, title: str) -> Any:
-    """Draw a panel for each index, with a bar for each source."""
+    """Return a figure with a panel per index and a bar per source."""
     from starhold.analysis.pointing import MEANINGS
     from starhold.report.bars import Bars, draw_bars
     from starhold.studies.budget import COMBINED, LOOP, TOGETHER
@@ -117,10 +117,12 @@ COMMAND = Command(
     later("studies.budget.study"),
     present,
     options={
-        "start": Option("budget.start", "errors count from this time; by default as the file says"),
-        "window": Option("budget.window", "length of windows; by default as the file says"),
-        "separation": Option("budget.separation", "of the two windows of a drift; by default as the file says"),
-        "runs": Option("budget.runs", "with independent random numbers; by default as the file says", whole=True),
+        "start": Option("budget.start", "time from which errors count; by default as in the file"),
+        "window": Option("budget.window", "length of windows; by default as in the file"),
+        "separation": Option("budget.separation", "time between a drift's two windows; by default as in the file"),
+        "runs": Option(
+            "budget.runs", "number of runs with independent random numbers; by default as in the file", whole=True
+        ),
     },
     unstable=True,
     prove=later("studies.pointing.budget_with_proof"),

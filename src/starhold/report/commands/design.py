@@ -1,4 +1,4 @@
-"""The gains that formulas give."""
+"""The command `design`, the gains that design forms compute."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WIDE = 132
 
 
 def present(scenario: Scenario, law: str | None, designs: Sequence[Design]) -> Result:
-    """Show the inputs of each design, its gains, and its figures of merit."""
+    """Return the result: the inputs of each design, its gains, and its figures of merit."""
     from starhold.report.stability_map import draw_map
     from starhold.scenario.designing import map_inputs
 
@@ -36,7 +36,7 @@ def _blocks(scenario: Scenario, design: Design) -> list[Block]:
         cells = [(item.name, number_text(values[item.name]), item.gain.unit, item.gain.text) for item in items]
         rows = [[*map(escape, row)] for row in cells]
         blocks.append(Table([*map(Column, (title, "value", "unit", "meaning"))], rows))
-    # Digits, not decimals: entries of P may differ by orders of magnitude.
+    # Significant digits, not decimals, because entries of P may differ by orders of magnitude.
     digits: Any = {"float_kind": lambda number: f"{number:12.6g}", "complex_kind": lambda number: f"{number:.6g}"}
     for name, value in design.figures.items():
         shown = f"{value:.3g}" if isinstance(value, float) else np.array2string(value, max_line_width=WIDE, formatter=digits)
@@ -50,7 +50,7 @@ COMMAND = Command(
     later("scenario.designing.design"),
     present,
     lambda scenario, law: law,
-    law="which law of the file; every one that has a form if not given",
+    law="which law of the file; by default all that have a form",
     doing=None,
     options={"map": Option("", "draw the degree of stability over all gains", file="png")},
     unstable=True,

@@ -1,4 +1,4 @@
-"""A study of the control that is left after the loss of any one or two wheels."""
+"""The command `failures`, the control authority after the loss of any one or two wheels."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) -> Result:
-    """Make a row for each loss; gains only where they were redesigned."""
+    """Return the result: a row per loss, with gains only where they were redesigned."""
     from starhold.laws.modes import mode_laws
     from starhold.report.text import number_text
 
     flown = [failure.gains for failure in failures if failure.gains is not None]
     retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
-    # What counts the losses left until the mode for them is no gain.
+    # The number of losses until the mode for them begins is not a gain.
     retuned = [name for name in retuned if name != "wheels_lost"]
     sentences: list[str] = []
     if any(not failure.controllable for failure in failures):
@@ -33,8 +33,8 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
     ]
     if mode_laws(entry.law, entry.gains) and any(failure.flown and failure.settling is None for failure in failures):
         sentences.append(
-            "not settled: at the end of the mission, with the target of the mode that then flies; a [[law]] that is that "
-            "mode's alone, named by --law, settles by itself."
+            "not settled: judged at the end of the flight, for the target of the mode active then; to judge a single mode, "
+            "give it as a [[law]] of its own and name it by --law."
         )
     if not retuned:
         sentences.append("The gains are the same in all of them.")
@@ -131,14 +131,14 @@ def _full(failure: Failure) -> str | None:
 
 
 def _directions(failure: Failure) -> str:
-    """The body directions without authority."""
+    """Return the body directions without authority as text."""
     if len(failure.lacking) == 3:
         return "any axis"
     return " and ".join(f"({', '.join(f'{x:.3g}' for x in direction)})" for direction in failure.lacking)
 
 
 def draw(failures: Sequence[Failure], title: str) -> Any:
-    """Draw a row for each loss and a panel for each quantity."""
+    """Return a figure with a row per loss and a panel per quantity."""
     from starhold.report.bars import draw_bars
 
     panels = [_bars("authority left, % of intact", failures, [100.0 * failure.share for failure in failures])]
@@ -146,7 +146,7 @@ def draw(failures: Sequence[Failure], title: str) -> Any:
         panels.append(_bars("degree of stability, 1/s", failures, [failure.eta for failure in failures]))
     panels.append(_bars("settling time, s", failures, [failure.settling for failure in failures]))
     if any(failure.certified is not None for failure in failures):
-        # Rounded down, so that it never exceeds what is proved.
+        # Rounded down, so that it never exceeds the proved value.
         turns = [None if f.certified is None else math.floor(10.0 * math.degrees(f.certified[0])) / 10.0 for f in failures]
         panels.append(_bars("certified turn, °", failures, turns, "not proved"))
     rows, hues = [failure.name for failure in failures], [0 if failure.lost else 2 for failure in failures]
@@ -156,7 +156,7 @@ def draw(failures: Sequence[Failure], title: str) -> Any:
 
 
 def _bars(label: str, failures: Sequence[Failure], values: Sequence[float | None], missing: str = "not settled") -> Any:
-    """Make a panel with the number at the end of each bar, or the reason why there is none."""
+    """Return a panel with the number at the end of each bar, or the reason why there is none."""
     from starhold.report.bars import Bars
 
     lost = ["diverged" if f.diverged_at is not None else "not flown" if f.refused else missing for f in failures]
@@ -165,7 +165,7 @@ def _bars(label: str, failures: Sequence[Failure], values: Sequence[float | None
 
 
 COMMAND = Command(
-    "Show the control left after the loss of any one or two wheels: a table, failures.csv and failures.png.",
+    "Show the control authority after the loss of any one or two wheels: a table, failures.csv and failures.png.",
     "failures",
     later("studies.failures.study"),
     present,

@@ -1,4 +1,4 @@
-"""Numbers of a scenario fitted to telemetry."""
+"""The command `identify`, which fits numbers of a scenario to telemetry."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.studies.identify import Identified
 EXAMPLE = '"spacecraft.inertia, part.gyro.bias"'
-WHOSE = "recorded, law or none: what commands the craft; as recorded where that is, else the law"
+WHOSE = "recorded, law or none: source of the commands; by default the recorded ones if any, else the law"
 POINTS = 4000
-"""Samples of a curve that are drawn."""
+"""The number of samples of a drawn curve."""
 
 
 def present(scenario: Scenario, entry: LawEntry, *given: Any) -> Result:
-    """One row a free number; what the data do not tell; the residuals; the keys to be pasted."""
+    """Return the result: a row per free number, undetermined combinations, the residuals, and keys to be pasted."""
     result: Identified = given[-1]
     title = f"{scenario.name}: numbers fitted to {result.telemetry}"
     pasted = [f"{key} = {value}" for key, value in result.fitted().items()]
@@ -26,7 +26,7 @@ def present(scenario: Scenario, entry: LawEntry, *given: Any) -> Result:
     try:
         learnt = result.learnt().text
     except InputError as error:
-        # A fit of a model that lacks something may end at numbers that no file may have.
+        # A fit of an incomplete model may end at numbers that a file must not have.
         learnt = None
         blocks.append(
             f"The scenario refuses these numbers, so that there is no identify.toml: {error.key}: {error.allowed}."
@@ -54,13 +54,13 @@ def _words(result: Identified) -> list[str]:
     from starhold.studies.identify import COMMANDS
 
     degrees, spread = result.degrees, (result.chi2 / result.degrees) ** 0.5
-    fits = "what the stated noise gives" if result.consistent >= 0.01 else "more than the stated noise gives"
+    fits = "consistent with the stated noise" if result.consistent >= 0.01 else "more than the stated noise explains"
     worst = min(result.whiteness, key=lambda name: result.whiteness[name])
     white = "no residual is correlated in time"
     if not result.white:
-        white = f"{worst} is correlated in time (Ljung-Box, p = {result.whiteness[worst]:.1g}): something flies that the"
-        white += " scenario lacks, and the intervals are too narrow"
-    ended = "" if result.settled else f"The fit has not settled in {result.iterations} steps. "
+        white = f"{worst} is correlated in time (Ljung-Box, p = {result.whiteness[worst]:.1g}): the scenario lacks an effect"
+        white += " of the real flight, and the intervals are too narrow"
+    ended = "" if result.settled else f"The fit has not converged in {result.iterations} steps. "
     return [
         "",
         COMMANDS[result.commands],
@@ -71,7 +71,7 @@ def _words(result: Identified) -> list[str]:
 
 
 def _numbers(result: Identified) -> Table:
-    """Estimates with their covariance, NaN where they are undetermined."""
+    """Return the estimates with their covariance, NaN where undetermined."""
     posterior = result.posterior
     heads = ["number", "unit", "file", "estimate", "deviation", *(f"covariance {name}" for name in result.free.names)]
     values = zip(result.free.names, result.free.units, result.free.values, result.values, strict=True)
@@ -80,7 +80,7 @@ def _numbers(result: Identified) -> Table:
 
 
 def draw(result: Identified, title: str) -> Any:
-    """A row for each sensor: what it read with the fit, and the residuals in deviations of its noise."""
+    """Return a figure with a row per sensor: its readings with the fit, and the residuals in standard deviations."""
     from starhold.report.figures import framed, plain
     from starhold.report.plots import COLOURS
     from starhold.report.ticks import label_ticks
@@ -109,14 +109,14 @@ def draw(result: Identified, title: str) -> Any:
 
 
 COMMAND = Command(
-    "Fit numbers of a scenario to telemetry: identify.csv, identify.png, and identify.toml, the scenario to fly on with.",
+    "Fit numbers of a scenario to telemetry: identify.csv, identify.png, and identify.toml, the fitted scenario.",
     "identify",
     later("studies.identify.study"),
     present,
     doing=None,
     options=TELEMETRY
     | {
-        "free": Option("", f"keys of the numbers to fit, with commas between: {EXAMPLE}", content=as_given),
+        "free": Option("", f"keys of the numbers to fit, separated by commas: {EXAMPLE}", content=as_given),
         "commands": Option("", WHOSE, content=as_given),
     },
     unstable=True,

@@ -1,4 +1,4 @@
-"""A table and a picture of the proved invariant sets of any small system."""
+"""The command `invariant`, a table and a picture of the proved invariant sets of a small system."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ if TYPE_CHECKING:
 
 
 def listed() -> list[Block]:
-    """The systems that come with starhold."""
+    """Return the names of the built-in systems."""
     from starhold.certification import invariant as sets
 
     return [Heading(name, f"  {sets.load(name).description}") for name in sets.builtin_names()]
 
 
 def read(problem: InvariantProblem | str | Path) -> tuple[InvariantProblem]:
-    """Return the problem: one made in Python, one read from a file, or the built-in one of this name."""
+    """Return the problem itself, the one in a file, or the built-in one of this name."""
     from starhold.certification import invariant as sets
 
     return (problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem),)
 
 
 def present(problem: InvariantProblem, certificate: SetCertificate) -> Result:
-    """Present each claim with its outcome, how it was shown and what is missing; the phase portrait with the sets."""
+    """Return the result: each claim with its outcome, its method or what is missing, and the phase portrait with the
+    sets."""
     from starhold.certification import invariant as sets
     from starhold.certification.assumptions import texts
     from starhold.studies.phase_portraits import portraits

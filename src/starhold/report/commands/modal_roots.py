@@ -1,4 +1,4 @@
-"""The roots of the modal law that slew fastest within limits, over the initial angle."""
+"""The command `modal-roots`, the roots of the modal law that slew fastest within limits, over the initial angle."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ POINTS = 200
 
 
 def present(scenario: Scenario, entry: LawEntry, result: Study) -> Result:
-    """Present a row for each angle, the quality of the fits, and the law to be pasted."""
+    """Return the result: a row per angle, the quality of the fits, and the law to be pasted."""
     from starhold.studies.modal_roots import law_lines
 
     sentences: list[str] = []
@@ -63,7 +63,7 @@ def _table(result: Study) -> Table:
 
 
 def draw(result: Study, title: str) -> Any:
-    """The figure: roots, times and rates over the angle; errors of the fits where there are any."""
+    """Return a figure of roots, times and rates over the angle, and of the errors of the fits, if any."""
     import numpy as np
 
     from starhold.report.figures import framed, plain
@@ -97,7 +97,7 @@ def draw(result: Study, title: str) -> Any:
     for axis in axes:
         plain(axis)
         axis.set_axisbelow(True)
-    # Fits were drawn first, to lie behind; in the legend the points come first.
+    # Fits are drawn first, behind the points; in the legend the points come first.
     handles = top.get_legend_handles_labels()[0]
     place = {"loc": "upper left", "bbox_to_anchor": (0.09, 1.0 - 0.30 / figure.get_figheight())}
     handles = [*handles[len(fits) :], *handles[: len(fits)]]
@@ -106,7 +106,7 @@ def draw(result: Study, title: str) -> Any:
 
 
 def _line(axis: Any, pieces: TwoPieceFit, angles: Any, words: str, style: dict[str, Any]) -> None:
-    """Draw each piece by itself, because they do not join."""
+    """Draw each piece separately, because the pieces do not join."""
     import numpy as np
 
     split = np.degrees(pieces.split)

@@ -1,4 +1,4 @@
-"""Sheets for the test of signs and axes before launch."""
+"""The command `phasing`, sheets for the test of signs and axes before launch."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 MANUAL = (
     "The craft is at rest on target, without external torque and with its rotors at rest. Each stimulus is given by "
-    "hand, by coil or by telecommand, and all stages of its rows are read. Signs count, and which number of a vector is "
-    "large; sizes need not be exact. An attitude is given as the rotation from the attitude on target.",
+    "hand, by coil or by telecommand, and all stages in its rows are read. Signs count, and which component of a vector "
+    "is largest; magnitudes need not be exact. An attitude is given as the rotation from the attitude on target.",
     "Numbers, or +, - and 0, go into the column seen of phasing.csv, which has a row for each number of this sheet; "
     "starhold phasing FILE --check phasing.csv -o DIR judges them.",
 )
 
 
 def present(scenario: Scenario, entry: LawEntry, seen: Seen | None, result: Phasing) -> Result:
-    """The numbers of rows of each stage, what was found, and the sheet as a page and a table."""
+    """Return the result: the number of rows of each stage, the outcome, and the sheet as a page and a table."""
     from starhold.report.document import Section
 
     sheet = result.sheet
@@ -48,7 +48,7 @@ def _numbers(result: Phasing) -> Table:
 
 
 def _page(result: Phasing) -> Table:
-    """A row for each vector."""
+    """Return a table with a row per vector."""
     rows: list[list[Any]] = []
     ends: list[int] = []
     for stimulus, stage, unit, cells in _vectors(result):
@@ -65,7 +65,7 @@ def _page(result: Phasing) -> Table:
 
 
 def _vectors(result: Phasing) -> Iterator[tuple[str, str, str, list[Any]]]:
-    """Stimulus, stage and unit of each vector, and its cells with what was seen."""
+    """Yield the stimulus, stage and unit of each vector, and its cells with their observations."""
     vectors: dict[Any, list[Any]] = {}
     for cell, seen in zip(result.sheet.cells, _seen(result), strict=True):
         vectors.setdefault((cell.stimulus, cell.stage, cell.unit), []).append((cell, seen))

@@ -1,4 +1,4 @@
-"""Telemetry is replayed: recorded readings go through the estimator and the law of a scenario."""
+"""The command `replay`, which passes recorded readings through the estimator and the law of a scenario."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ TELEMETRY = {
     ),
     "mapping": Option(
         "",
-        "a TOML file that says what its columns hold, or the name of one",
+        "a TOML file that defines its columns, or the name of a built-in one",
         content=later("studies.telemetry_files.existing_mapping"),
     ),
 }
-"""The options that name recorded telemetry and its mapping."""
+"""The arguments that name recorded telemetry and its mapping."""
 READABLE = later("studies.telemetry.check")
-"""This function refuses telemetry that cannot be read."""
+"""The function that refuses unreadable telemetry."""
 MOST_PANELS = 6
-"""Quantities that a figure shows: those that part first."""
+"""The most quantities in a figure, which shows those that differ first."""
 
 
 def present(scenario: Scenario, entry: LawEntry, telemetry: Any, mapping: Any, tolerance: Any, result: Replay) -> Result:
-    """A row for each quantity, where they first part, and what the telemetry lacks."""
+    """Return the result: a row per quantity, the first differences, and gaps in the telemetry."""
     title = f"{scenario.name}, {entry.name}: replay of {result.telemetry.name}"
     heads = [Column("quantity"), Column("unit"), Column("samples", "", "d"), Column("rms difference", "", ".3g")]
     heads += [Column("largest", "", ".3g"), Column("at", "s", ".6g")]
@@ -54,7 +54,7 @@ def _row(one: Comparison) -> list[Any]:
 
 
 def _numbers(result: Replay) -> Table:
-    """All that was computed, at each control step, with what was recorded then."""
+    """Return a table of all computed quantities at each control step, with the recorded ones."""
     import numpy as np
 
     from starhold.studies.telemetry_files import heads_of
@@ -76,7 +76,7 @@ def _numbers(result: Replay) -> Table:
 
 
 def draw(result: Replay, title: str) -> Any:
-    """A panel for each quantity: how far it is from what was recorded, and how far it may be, dashed."""
+    """Return a figure with a panel per quantity: the difference from the recorded values, and the allowed one, dashed."""
     import numpy as np
 
     from starhold.report.figures import framed, plain
@@ -95,18 +95,24 @@ def draw(result: Replay, title: str) -> Any:
         label_ticks(axis.yaxis)
         axis.yaxis.get_offset_text().set_size(8.5)
         axis.set_ylabel(f"{one.name.replace('_', ' ')}\n{one.unit}", fontsize=8)
-    axes.ravel()[-1].set_xlabel("time, s; differences, what is allowed dashed, the first parting upright", fontsize=8.5)
+    axes.ravel()[-1].set_xlabel("time, s; differences (dashed: allowed; vertical line: first excess)", fontsize=8.5)
     return figure
 
 
 COMMAND = Command(
-    "Replay telemetry: what the estimator and the law make of recorded readings, and where that parts from the recorded.",
+    "Replay telemetry through the estimator and the law, and show where the results first differ from the recorded ones.",
     "replay",
     later("studies.replay.study"),
     present,
     doing=None,
     options=TELEMETRY
-    | {"tolerance": Option("", "share of the largest value; else 0.01", content=later("studies.replay.tolerance_of"))},
+    | {
+        "tolerance": Option(
+            "",
+            "share of the largest value by which others may differ; 0.01 if not given",
+            content=later("studies.replay.tolerance_of"),
+        )
+    },
     unstable=True,
     check=READABLE,
     kinds=("csv", "png"),

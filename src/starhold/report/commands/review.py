@@ -1,4 +1,4 @@
-"""A review pack: all that is known about a law of a scenario, as a page that prints well and as Markdown."""
+"""The command `review`, a review pack with all evidence about a law of a scenario, as a printable page and as Markdown."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def present(scenario: Scenario, entry: LawEntry, review: Review) -> Result:
-    """Present the verdicts, as `verify` shows them, the open points, and the document."""
+    """Return the result: the verdicts as in `verify`, the open points, and the document."""
     from starhold.report.commands import verify
     from starhold.report.review import OPEN, sections_of
 
@@ -21,13 +21,13 @@ def present(scenario: Scenario, entry: LawEntry, review: Review) -> Result:
     sections, points = sections_of(review)
     blocks.append(f"{OPEN}: {len(points)}." if points else "No point is open.")
     blocks += [f"{number}. {text}" for number, (_, text) in enumerate(points, 1)]
-    # Without requirements nothing is shown to be met.
+    # Without requirements there is no outcome.
     outcome = judged.outcome if review.verdicts else "undecided"
     return Result(f"{scenario.name}, {entry.name}: review", blocks, document=sections, outcome=outcome)
 
 
 COMMAND = Command(
-    "Collect for a review what is known about a law and what is left open: review.html, which prints well, and review.md.",
+    "Collect the evidence about a law and the open points for a review: review.html, which prints well, and review.md.",
     "review",
     later("campaign.verify.examine"),
     present,

@@ -1,4 +1,4 @@
-"""The sail area that a circle about a libration point requires."""
+"""The command `sail`, the sail area that a circle about a libration point requires."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 DAY = 86400.0
 RATES = (0.8, 1.0, 1.2, 1.6, 1.8, 2.0)
-"""Omega; the best rate is added to them."""
+"""Rates on the circle in units of Omega, to which the best rate is added."""
 REFLECTIVITIES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 DEFICITS = (0.0, 0.05, 0.1)
 UNITS = {"radius": "m", "mass": "kg", "area": "m^2", "pressure": "N/m^2"}
@@ -54,7 +54,7 @@ def read(**given: Any) -> tuple[Station, float, float | None]:
 
 
 def _number(name: str, text: Any) -> Any:
-    """Read a positive quantity with its unit, or a share of the light; a plain number is SI."""
+    """Return a positive quantity, or a share of the light, read from its text; a plain number is SI."""
     from pydantic_core import PydanticCustomError
 
     from starhold.laws.interface import Gain
@@ -70,8 +70,8 @@ def _number(name: str, text: Any) -> Any:
 
 
 def present(station: Station, mass: float, area: float | None, _same: Station) -> Result:
-    """Present the design, then the sail over rates and reflectivities, and the control left at deficits of the circle's
-    demand."""
+    """Return the result: the design, the sail over rates and reflectivities, and the control left at deficits relative to
+    the circle's demand."""
     from starhold.parts.bodies.libration_point import nonlinear
     from starhold.synthesis.circle import demand
 
@@ -130,7 +130,7 @@ def _margin(station: Station, area: float, mass: float) -> str:
 
 
 def _deficits(station: Station, deficits: list[float]) -> Table:
-    """Make a row for each deficit, with the control it leaves; a margin is a negative deficit."""
+    """Return a table with a row per deficit and the control that it leaves; a margin is a negative deficit."""
     columns = [Column("deficit", "%", ".4g"), Column("largest radius", "km", ".6g"), Column("Sun seen there", "%", ".4g")]
     columns += [Column("radius in that light", "km", ".6g"), Column("on its limit, full circle", "% of the time", ".3g")]
     rows: list[list[float]] = []
@@ -152,12 +152,12 @@ COMMAND = Command(
     options={
         "primaries": Option("", "the Sun and the other body", default="sun-earth"),
         "point": Option("", "libration point: L1 or L2", default="L2"),
-        "radius": Option("", 'of the circle, "20000 km"; the body\'s diameter if not given'),
-        "mass": Option("", 'of the craft, "300 kg"', default="300 kg"),
+        "radius": Option("", 'radius of the circle, "20000 km"; the body\'s diameter if not given'),
+        "mass": Option("", 'mass of the craft, "300 kg"', default="300 kg"),
         "area": Option("", 'actual sail area, "200 m^2", for its margin'),
-        "reflectivity": Option("", "part of the light reflected as by a mirror", default="1"),
-        "diffuse": Option("", "part of the light reflected in all directions", default="0"),
-        "pressure": Option("", 'of the whole Sun\'s light on black, "4.5e-6 N/m^2"; by distance if not given'),
+        "reflectivity": Option("", "share of the light reflected as by a mirror", default="1"),
+        "diffuse": Option("", "share of the light reflected diffusely", default="0"),
+        "pressure": Option("", 'pressure of full sunlight on black, "4.5e-6 N/m^2"; by distance if not given'),
         "output": Option("", "write the table", file="csv"),
     },
 )

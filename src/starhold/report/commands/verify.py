@@ -1,4 +1,4 @@
-"""This command reports whether a law meets its requirements."""
+"""The command `verify`, which reports whether a law meets its requirements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NUMBERS = (Column("number", "", ">"), Column("limit", "", ">"), Column("margin",
 
 
 def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementVerdict]) -> Result:
-    """Make a row for each requirement, and below the table say why one is not met."""
+    """Return the result: a row per requirement, and below the table the reasons why one is not met."""
     from rich.markup import escape
 
     rows: list[list[Any]] = []
@@ -31,13 +31,13 @@ def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementV
 
 
 def numbers(one: RequirementVerdict) -> list[str | None]:
-    """Number, limit and margin, for reading."""
+    """Return number, limit and margin as text."""
     limit = amount(one, one.limit)
     return [amount(one, one.number), limit and f"{'≤' if one.at_most else '≥'} {limit}", amount(one, one.margin)]
 
 
 def amount(one: RequirementVerdict, value: float | None) -> str | None:
-    """Show a number in the unit in which the limit is typed, rounded for reading."""
+    """Return a number as text in the unit in which the limit is typed, rounded."""
     if value is None:
         return None
     unit = one.typed_unit or ("" if one.unit == "1" else one.unit)
@@ -45,7 +45,7 @@ def amount(one: RequirementVerdict, value: float | None) -> str | None:
 
 
 def _matrix(verdicts: Sequence[RequirementVerdict]) -> Table:
-    """Return all that is known of each, numbers in SI."""
+    """Return a table with all fields of each verdict, numbers in SI."""
     columns = ("id", "parent", "text", "rationale", "method", "metric", "verdict", "number", "limit", "margin", "unit")
     rows: list[list[Any]] = []
     for one in verdicts:
@@ -56,8 +56,8 @@ def _matrix(verdicts: Sequence[RequirementVerdict]) -> Table:
 
 
 def junit(title: str, law: str, verdicts: Sequence[RequirementVerdict]) -> str:
-    """Return the verdicts as JUnit XML: a missed requirement is a failure and an undecided one an error, so that only what
-    was shown passes."""
+    """Return the verdicts as JUnit XML: a missed requirement is a failure and an undecided one an error, so that only met
+    ones pass."""
     from xml.etree import ElementTree as Tree
 
     counts = {name: sum(one.verdict == kind for one in verdicts) for kind, name in JUNIT.items()}
@@ -75,7 +75,7 @@ def junit(title: str, law: str, verdicts: Sequence[RequirementVerdict]) -> str:
 
 
 JUNIT = {"missed": "failure", "not decided": "error"}
-"""JUnit's names for verdicts; a requirement that is met has passed."""
+"""JUnit's elements for verdicts; a met requirement has none."""
 
 COMMAND = Command(
     "Report which requirements of a file are met, each by its own method: a table, verify.csv, and verify.xml for JUnit.",

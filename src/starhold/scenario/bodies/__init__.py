@@ -1,5 +1,5 @@
-"""The bodies of scenarios: each module or folder here defines the tables of one, which no other code names; `any_body`
-defines those of all others."""
+"""The bodies of scenarios. Each module or folder here defines the tables of one body, and no other code names it;
+`any_body` defines the tables of all other bodies."""
 
 import pkgutil
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ def bodies() -> dict[str, Body]:
 
 
 def body_of(tables: Mapping[str, Any], where: str, folder: Path) -> Body:
-    """Return the body of a file's tables, by its marker; InputError for none and for several."""
+    """Return the body whose marker table is in the file. InputError if there is none, or more than one."""
     markers = {body.marker: body for body in (_any_body().NAMED_BY_TABLE, *bodies().values())}
     there = [marker for marker in markers if marker in tables]
     if len(there) > 1:
@@ -39,12 +39,12 @@ def body_of(tables: Mapping[str, Any], where: str, folder: Path) -> Body:
 
 
 def body_for(law: Law) -> Body:
-    """Return the body of a law."""
+    """Return the body that a law controls."""
     return bodies().get(law.body) or _any_body().AnyBody(find("body", law.body))
 
 
 def others() -> list[Body]:
-    """Return the bodies without tables of their own: each installed one, and one for those in files."""
+    """Return the bodies without tables of their own: each installed one, and one that stands for all bodies in files."""
     return [
         _any_body().NAMED_BY_TABLE,
         *(_any_body().AnyBody(part) for name, part in parts("body").items() if name not in bodies()),
@@ -52,5 +52,5 @@ def others() -> list[Body]:
 
 
 def _any_body() -> Any:
-    # Its tables come from `schema`, which looks up all bodies here.
+    # Imported here, because its tables come from `schema`, which looks up all bodies in this module.
     return import_module(f"{__name__}.any_body")

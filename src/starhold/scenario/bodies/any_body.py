@@ -1,5 +1,5 @@
-"""Scenarios of any body without tables of its own, recognized by their [body] table: an installed part, or one in a file.
-The part's parameters are the keys of [body], its state's fields those of [initial]."""
+"""Scenarios of a body without tables of its own, recognized by their [body] table. The body is an installed part or one in
+a file; its parameters are the keys of [body], and the fields of its state are the keys of [initial]."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class AnyTiming(SeededTiming):
 
 
 class BodyFromFile(Table):
-    """Any body, in a file."""
+    """A body defined in a Python file."""
 
     model_config = ConfigDict(extra="allow")
     file: Annotated[str, Field(description="a Python file that holds a body, relative to this one; it is run")]
@@ -61,7 +61,7 @@ class AnyCommand(Table):
 
 
 class BodyFromFileTables(ScenarioTable):
-    """A whole file about a body in a file, but for its law tables and for what that body declares."""
+    """A scenario of a body in a file, without the law tables and the keys that the body declares."""
 
     body: BodyFromFile
     control: AnyCommand = AnyCommand()
@@ -70,8 +70,8 @@ class BodyFromFileTables(ScenarioTable):
 
 
 class Context(NamedTuple):
-    """The scenario's name in errors, and the folder to which its file names are relative. All numbers are in the units that
-    the body declares."""
+    """The scenario's name in errors, and the folder to which its file names are relative. Numbers are in the body's units,
+    none scaled."""
 
     where: str
     folder: Path
@@ -90,7 +90,7 @@ class Made(NamedTuple):
 
 
 class AnyBody(Body):
-    """One body, as its part declares it."""
+    """A body whose tables and units follow from what its part declares."""
 
     marker = MARKER
     modelled = (MARKER,)
@@ -132,7 +132,7 @@ class AnyBody(Body):
 
 
 class NamedByTable:
-    """Represents all these bodies until a file's [body] table names one."""
+    """A placeholder for all these bodies until a file's [body] table names one."""
 
     name = ""
     marker = MARKER
@@ -177,8 +177,8 @@ def _read(path: Path, folder: Path) -> AnyBody:
 
 @cache
 def tables_of(part: Part) -> type[ScenarioTable]:
-    """Return the tables of a file about a body, without those of its laws. ValueError, in one line, where the part declares
-    numbers that a file cannot give."""
+    """Return the model of a body's scenario file without its law tables. ValueError, in one line, where the part declares
+    a field that a file cannot give."""
     try:
         state, params = _state(part), _params(part)
         recorded = quantities(part.module.Sample)
@@ -194,7 +194,7 @@ def tables_of(part: Part) -> type[ScenarioTable]:
     title = part.name.replace("-", " ").title().replace(" ", "")
     named: Any = {"type": (Literal[part.name], ...)} if part.file is None else {"file": (str, ...)}
     body: Any = create_model(f"{title}Body", __base__=Table, __doc__=part.card.summary, **named, **columns(params))
-    initial: Any = create_model(f"{title}Initial", __base__=Table, __doc__="Where it starts.", **columns(state))
+    initial: Any = create_model(f"{title}Initial", __base__=Table, __doc__="The initial state.", **columns(state))
     unit = getattr(part.module, "TIME_UNIT", "s")
     command = recorded["command"].unit if "command" in recorded else "1"
     limit = quantity(Gain(command, above=0.0, text="largest command; none if absent"))
@@ -203,7 +203,7 @@ def tables_of(part: Part) -> type[ScenarioTable]:
     )
     time, said = ("s", "") if unit == "s" else ("1", f", in {unit}")
     duration = quantity(Gain(time, above=0.0, text=f"length of the run, in whole control periods{said}"))
-    hold = quantity(Gain(time, above=0.0, text=f"for which a command is held{said}"))
+    hold = quantity(Gain(time, above=0.0, text=f"time for which a command is held{said}"))
     timing: Any = create_model(
         f"{title}Timing",
         __base__=AnyTiming,
@@ -225,13 +225,13 @@ def tables_of(part: Part) -> type[ScenarioTable]:
     return create_model(
         f"{title}Tables",
         __base__=ScenarioTable,
-        __doc__=f"A whole file about the body {part.name}, but for its law tables.",
+        __doc__=f"A scenario of the body {part.name}, without its law tables.",
         **whole,
     )
 
 
 def _example(part: Part) -> str:
-    """Written from the example of the part's parameters, if it has one; unspecified state components are 0.1."""
+    """Return a small scenario in TOML with the example parameters of the part, if any; state components default to 0.1."""
     which = f'type = "{part.name}"' if part.file is None else f"file = {json.dumps(str(part.file))}"
     lines = ['name = "written"', f"[{MARKER}]", which]
     examples = part.examples() if part.hook("examples") else []
@@ -248,12 +248,12 @@ def _params(part: Part) -> list[contract.Field]:
 
 
 def _state(part: Part) -> list[contract.Field]:
-    """Return the fields of the state that a file gives: all but the command, which is zero at the start."""
+    """Return the state's fields that a file gives: all except the command, which is zero at the start."""
     return contract.fields(part.module.State, part.module.COMMAND)
 
 
 def _within(gain: contract.Parameter) -> Any:
-    """Return an allowed value of a parameter: 0.1 for each number, or one near it within the bounds."""
+    """Return an allowed value of a parameter: 0.1 for each number, or the nearest value within the bounds."""
     least = [0.1, *(x for x in (gain.at_least, None if gain.above is None else gain.above + 0.1) if x is not None)]
     value = min(max(least), math.inf if gain.at_most is None else gain.at_most)
     return [value] * gain.shape[0] if gain.shape else value

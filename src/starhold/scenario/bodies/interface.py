@@ -24,12 +24,12 @@ class Made(Protocol):
 
     @property
     def craft(self) -> Any:
-        """The body's numbers for laws and equations of motion."""
+        """The body's numbers (its craft), as used by laws and equations of motion."""
         ...
 
 
 class Moved(NamedTuple):
-    """The numbers of a loop from values of a file's keys: the body's initial state as its motion begins and as the loop is
+    """The numbers of a loop for given values of a file's keys: the body's state when its motion begins and when the loop is
     made, the craft that flies, the law's nominal model, the saturation limit of the command, and the loop's parts.
     """
 
@@ -56,15 +56,15 @@ class Body(Protocol):
     example: str
     """A small scenario in TOML, to which a law's table can be appended."""
     modes: bool = False
-    """Whether a law may be made of modes: the body's `Measurement` has what their conditions test."""
+    """Whether a law may consist of modes: the body's `Measurement` contains the quantities that their conditions test."""
     linked: Mapping[str, str] = MappingProxyType({})
-    """Keys of `dials` whose value follows another key until they are moved themselves."""
+    """Keys of `dials` that have the value of another key until they are changed themselves."""
     orbit: str = ""
-    """The additional table where a part needs an orbit."""
+    """The TOML text to append to `example` for a part that needs an orbit."""
     modelled: tuple[str, ...] = ()
-    """The tables whose numbers define the craft for laws."""
+    """The tables whose numbers define the craft that laws know."""
     designed: tuple[str, ...] = ()
-    """Further tables whose numbers give gains to laws with a design form."""
+    """Further tables from which design forms compute gains."""
 
     @property
     def template(self) -> str:
@@ -72,8 +72,8 @@ class Body(Protocol):
         return (resources.files(type(self).__module__) / "template.toml").read_text(encoding="utf-8")
 
     def chosen(self, tables: Mapping[str, Any], where: str, folder: Path) -> Body:
-        """Return the body of these raw tables, which have the marker: this one, unless the marker's table names another by a
-        type or a file. InputError where there is no such body."""
+        """Return the body of raw tables with this marker: this body, unless the marker's table names another by its type or
+        file. InputError where that body does not exist."""
         return self
 
     def laws(self) -> Mapping[str, Law]:
@@ -81,12 +81,12 @@ class Body(Protocol):
         return catalogue(self.name)
 
     def context(self, tables: Mapping[str, Any], where: str) -> Any:
-        """Return the context for validators of these raw tables and of laws' gains, such as the units of scaled numbers.
-        InputError where the tables do not give it."""
+        """Return the context in which raw tables and gains are validated, such as the units of scaled numbers. InputError
+        where the tables do not determine it."""
         return None
 
     def make(self, table: Any, where: str) -> Made:
-        """Return the numbers that validated tables define. InputError for numbers that no body has."""
+        """Return the numbers that validated tables define. InputError for a body that is physically impossible."""
         ...
 
     def complete(self, scenario: Scenario, law: Law, spec: Any, law_table: Any) -> Any:
@@ -95,22 +95,22 @@ class Body(Protocol):
         return spec
 
     def target(self, scenario: Scenario, given: Any, context: Any, key: str) -> Fitted:
-        """Return the target of a mode's raw table, named `key` in errors; for None that of the scenario. InputError where it
-        gives none."""
+        """Return the target that a mode's raw table defines, or the scenario's where the table is None; `key`: its name in
+        errors. InputError where it defines no target."""
         raise InputError(scenario.where, key, "a target", "none, because this body has no attitude")
 
     def options(self, scenario: Scenario, law_table: Any, gains: Any, key: str) -> Any:
-        """Return the options of a law besides its gains, from its validated table (named `key` in errors) or else from the
+        """Return a law's options, which are not gains, from its validated table (`key` in errors), by default from the
         scenario. InputError if they do not fit the gains."""
         return None
 
     def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
-        """Return the arguments of `ClosedLoop` from the body's tables for one law: the start, all parts, and those specific
-        to the body."""
+        """Return the arguments of `ClosedLoop` that the body's tables determine for one law: the initial state, the parts,
+        and arguments specific to the body."""
         ...
 
     def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
-        """The closed loop of one law."""
+        """Return the closed loop of one law."""
         timing = scenario.table.simulation
         shared = {
             "craft": scenario.craft,
@@ -125,26 +125,26 @@ class Body(Protocol):
         return ClosedLoop(**(shared | self.given(scenario, entry)))
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: Any) -> None:
-        """Raise InputError where the law of a loop, which has been called once, cannot work there."""
+        """Raise InputError where a law, already called once without error, cannot work in its loop."""
         return
 
     def drawn(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the arguments of `moved` for many runs that differ in the values of some keys or their components,
-        (components..., lanes) by key: an array (lanes,) in place of each number, without arguments that only `build`
-        determines."""
+        """Return the arguments of `moved` for a batch of runs, with an array (lanes,) in place of each number; columns: the
+        values of the keys (or single components) in which runs differ, (components..., lanes) by key. Arguments that only
+        `build` determines are left out."""
         return {}
 
     def dials(self, scenario: Scenario) -> dict[str, Any]:
-        """Return the keys that `moved` accepts, with their numbers in the scenario."""
+        """Return the keys that `moved` accepts, each with its value in the scenario."""
         return {}
 
     def moved(self, scenario: Scenario, loop: Any, values: Mapping[str, Any]) -> Moved:
-        """Return the numbers of a law's loop under other values of the keys of `dials`: an equation with the same bits as
-        `build` of the scenario with these `changes`."""
+        """Return the numbers of a law's loop for other values of the keys of `dials`. This is an equation whose result
+        equals bit for bit what `build` gives for the scenario with these `changes`."""
         return Moved(loop.start, loop.start, loop.craft, loop.craft, loop.saturation_limit(), loop.parts)
 
     def flown(self, scenario: Scenario, loop: Any, values: Mapping[str, Any], known: Mapping[str, Any]) -> Moved:
-        """Return the numbers of a loop that flies with values unknown to laws, or only partly known: an equation."""
+        """Return, by an equation, the numbers of a loop that flies with `values`, of which its law knows only `known`."""
         true = self.moved(scenario, loop, values)
         supposed = self.moved(scenario.known, replace(loop, craft=loop.known), known)
 
@@ -156,15 +156,15 @@ class Body(Protocol):
         return true._replace(nominal=supposed.craft, parts=tuple(parts))
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Any:
-        """Return the body's numbers as laws know them under these values of the keys of `dials`, which may be recorded
-        numbers; InputError, as for a file, for values that no file may have."""
+        """Return the craft that laws know for these values of the keys of `dials`, which may be recorded numbers. InputError
+        for values that would be refused in a file."""
         return scenario.craft
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the changes, for a scenario's `with_`, that give keys of `dials` these values."""
+        """Return the argument of `Scenario.with_` that sets keys of `dials` to these values."""
         return dict(values)
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Any]) -> Any:
-        """Return which lanes have values, (components..., lanes) by key, that are within the bounds of each number but
-        impossible for a body: (lanes,), or None where no such check exists."""
+        """Return a mask (lanes,) of the runs whose values, (components..., lanes) by key, are each within bounds but
+        together impossible for the body; None where nothing needs to be checked."""
         return None

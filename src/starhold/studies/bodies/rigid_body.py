@@ -134,7 +134,7 @@ class RigidBodyStudy(BodyStudy):
         return tuple(between for between in every if between is not None)
 
     def ends(self, issued: Issued, loop: ClosedLoop, time: float) -> int | None:
-        # A certificate ends where the loop changes next; the last of several events at one step decides.
+        # A certificate applies until the loop changes; of several events at one step the last one decides.
         latest = {event.step: event for event in loop.events if event.step * loop.period <= time}
         return min((step for step, event in latest.items() if _differs(event, issued, loop)), default=None)
 
@@ -147,7 +147,7 @@ STUDY = RigidBodyStudy()
 
 
 def _differs(event: Event, issued: Issued, flown: ClosedLoop) -> bool:
-    """Return whether after an event the loop that flies, or the law's model of it, differs from the one a certificate is
+    """Return whether the true loop, or the law's model of it, differs after an event from the loop that a certificate is
     about."""
     if event.step != issued.step or issued.step:
         return event.step > issued.step
@@ -183,7 +183,7 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing:
 
 
 def wanted_of(scenario: Scenario, pointing: bool) -> Wanted:
-    """Return the claims of a scenario's [certify] table; pointing: also how near to the target."""
+    """Return the claims that a scenario's [certify] table asks for; pointing: whether to add the proved pointing bound."""
     from starhold.certification.certify import Wanted
 
     table = scenario.table.certify
@@ -202,8 +202,8 @@ def certified_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> di
 
 
 def handed_over(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> dict[str, Ends]:
-    """Return the rates (rad/s) and angles (rad) below which the switches of a law hand over, by the names of their
-    certificates."""
+    """Return the rates (rad/s) and angles (rad) below which the switches of a law hand over to the next mode, by the names
+    of their certificates."""
     from starhold.certification.hand_over import ends
 
     every = named_loops(scenario, entry, loop) if mode_laws(loop.law, loop.gains) else []
@@ -219,7 +219,7 @@ def named_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[t
 
 
 def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
-    """Return the initial loop and each later loop that the law knows, with the control step from which it flies."""
+    """Return the initial loop and each later loop that the law knows, with the control step at which it begins."""
     known = [(0, replace(loop, events=()))]
     # A law that goes on with its memory does not begin anew; each mode does.
     if loop.remembers and not mode_laws(loop.law, loop.gains):
@@ -231,7 +231,7 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
             continue
         now = _after(event, loop)
         if step:
-            # One more step, for the changes that come with the event.
+            # One more step, for changes at the event itself.
             carry = fly(loop, step)[1]
             phase = next(phase for phase in loop.phases(steps) if phase.first == step)
             carry = phase.entered(carry)

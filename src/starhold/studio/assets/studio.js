@@ -178,7 +178,7 @@ function tell(found) {
   if (wrong !== null) editor.removeLineClass(wrong, "background", "wrong-line");
   wrong = null;
   if (found.asks) {
-    say(`To check this, Python code is run: ${found.asks.join(", ")}. It may do whatever you may. It is run again at each check and each flight. `, "");
+    say(`Checking this scenario runs Python code: ${found.asks.join(", ")}. It has all your permissions, and runs again at each check and flight. `, "");
     const button = document.createElement("button");
     button.textContent = "Run it";
     button.addEventListener("click", async () => {
@@ -276,7 +276,7 @@ function update(job) {
 function taker(frame, box) {
   const button = document.createElement("button");
   button.textContent = "To the editor";
-  button.title = "Edit the scenario of what the report shows";
+  button.title = "Edit the scenario that the report shows";
   button.addEventListener("click", async () => {
     const text = frame.contentWindow.fileText(), own = box.dataset.document === doc.name;
     if (!(await room())) return;

@@ -1,4 +1,4 @@
-"""Matrices, conditions and counts of the publication on linear-quadratic stabilisation, which no scenario holds."""
+"""Matrices, conditions and counts of the publication on linear-quadratic stabilisation that are not part of any scenario."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -22,8 +22,8 @@ TRIALS = 60
 
 
 def gravity_torque(desk: Desk) -> Finding:
-    """The largest gravity torque (1.1) on bodies of the publication's moments, whose least moment is small: over all
-    attitudes |e x J e| is half the difference of the largest and the least moment (N m)."""
+    """Return the largest gravity torque (1.1), in N m, on bodies with the publication's moments, whose least moment is
+    small: the maximum of |e x J e| over all attitudes is half the difference of the largest and the least moment."""
     return Finding([1.5 * ORBIT**2 * moment for moment in (1e2, 1e4)], "for moments of 1e2 and 1e4 kg m²")
 
 
@@ -43,19 +43,19 @@ def controllable(desk: Desk) -> Finding:
     ranks = set[int]()
     for inertia in _inertias():
         a, b = linear_model(inertia)
-        # Scaled, for J^-1 is small.
+        # Scaled, because J^-1 is small.
         ranks.add(int(np.linalg.matrix_rank(np.hstack([b, a @ b]) * np.linalg.norm(inertia))))
     return Finding(ranks == {6}, f"rank {ranks.pop()} for {TRIALS} inertias")
 
 
 def riccati_solution(desk: Desk, form: str) -> Finding:
-    """Return whether a form's P is the stabilising solution that a numerical solver finds, and positive definite, for random
+    """Return whether a form's P is positive definite and equals the stabilising solution of a numerical solver, for random
     inertias and weights."""
     worst, least = 0.0, np.inf
     for inertia, spec in _specs(form):
         q, r, p = lqr.riccati_problem(make_craft(inertia), spec)
         other = np.asarray(solve_riccati(inertia, q, r).p)
-        # Units differ: each entry is compared beside its own row and column.
+        # Units differ: each entry is compared relative to its row and column.
         scale = np.sqrt(np.outer(np.diag(other), np.diag(other)))
         worst = max(worst, float(np.abs((p - other) / scale).max()))
         least = min(least, float(np.linalg.eigvalsh(p / scale).min()))
@@ -81,7 +81,7 @@ def costs_least(desk: Desk) -> Finding:
 
 
 def middle_weight(desk: Desk) -> Finding:
-    """Return whether (2.24) makes (2.23) hold, and y2 positive, and whether the weights that `balance` moves obey it."""
+    """Return whether (2.24) implies (2.23) and a positive y2, and whether weights changed by `balance` satisfy it."""
     random, worst = np.random.default_rng(RNG), 0.0
     for _ in range(TRIALS):
         moments = np.sort(10.0 ** random.uniform(2.0, 4.0, 3))
@@ -109,7 +109,8 @@ def sign_of_term(desk: Desk) -> Finding:
 
 
 def channels(desk: Desk) -> Finding:
-    """The gains that the nine weights of form II move independently: all of them, and on the surface (2.23)."""
+    """Return the numbers of gains that the nine weights of form II change independently: in general, and on the surface
+    (2.23)."""
     moments, random = np.array([2500.0, 9000.0, 9800.0]), np.random.default_rng(RNG)
     weights = np.log(balance(moments, 10.0 ** random.uniform(-1.0, 1.0, 6), np.ones(3), "q5")[0])
     start = np.concatenate([weights, np.zeros(3)])
@@ -125,21 +126,21 @@ def channels(desk: Desk) -> Finding:
     def slopes(function: Any) -> Any:
         return np.array([(function(start + one) - function(start - one)) / 2e-5 for one in 1e-5 * np.eye(9)]).T
 
-    # Moves of the weights along the surface are those across its normal.
+    # Changes of the weights along the surface are orthogonal to its normal.
     every, along = slopes(gains), np.linalg.svd(slopes(condition)[None, :])[2][1:].T
     ranks = [np.linalg.matrix_rank(moved, tol=1e-6) for moved in (every, every @ along)]
     return Finding([float(rank) for rank in ranks], "ranks of the gains' derivative by the weights")
 
 
 def conditions(desk: Desk, file: str, laws: Sequence[str], claim: str) -> Finding:
-    """Return for which laws a claim is proved."""
+    """Return for each law whether a claim is proved."""
     issued = {law: desk.claims(file, law).get(claim) for law in laws}
     proved = {law: one is not None and one.outcome == "proved" for law, one in issued.items()}
     return Finding(proved, f"{claim} proved by certificate")
 
 
 def falling(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
-    """Return along which flights V is non-increasing, but for its rounding."""
+    """Return for each flight whether V is non-increasing along it, up to rounding."""
     verdicts: dict[str, bool] = {}
     for file, law in runs:
         values = _lyapunov(desk, file, law)
@@ -148,7 +149,8 @@ def falling(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
 
 
 def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
-    """Return from which rates form I fails to settle in 12 h; wheels of 0.1 N m balance the gyroscopic torque of none."""
+    """Return for each initial rate whether form I fails to settle in 12 h; at none of them can wheels of 0.1 N m balance the
+    gyroscopic torque."""
     verdicts: dict[str, bool] = {}
     notes: list[str] = []
     for rate in rates:
@@ -166,8 +168,8 @@ def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
 
 
 def globally(desk: Desk) -> Finding:
-    """Return for which laws the required attitude attracts every start: not for those whose torque vanishes at q0 = -1 too,
-    the same attitude."""
+    """Return for each law whether the required attitude attracts every start; it does not if the torque also vanishes at
+    q0 = -1, which is the same attitude."""
     verdicts: dict[str, bool] = {}
     for entry in desk.scenario("stabilisation").laws:
         loop = desk.loop("stabilisation", entry.name)
@@ -178,8 +180,8 @@ def globally(desk: Desk) -> Finding:
 
 
 def offset(desk: Desk, law: str) -> Finding:
-    """Return whether a law's error under disturbance is the one that its stiffness holds against it: |q| = |K^-1 M|, to a
-    tenth."""
+    """Return whether a law's error under a disturbance M is that at which its stiffness balances M: |q| = |K^-1 M|, to
+    within a tenth."""
     run = desk.recording("disturbed", law)
     gain = desk.loop("disturbed", law).gains.k_attitude
     stiffness = np.full(3, gain) if isinstance(gain, float) else np.diag(gain) if np.ndim(gain) == 2 else np.asarray(gain)
@@ -193,7 +195,7 @@ def offset(desk: Desk, law: str) -> Finding:
 
 
 def lyapunov_functions(desk: Desk, runs: Sequence[tuple[str, str]]) -> Figure:
-    """V over time along several flights, as a share of its value at the start."""
+    """Return a figure of V over time along several flights, as a share of its initial value."""
     curves: list[Curve] = []
     for file, law in runs:
         values = _lyapunov(desk, file, law)
@@ -202,7 +204,7 @@ def lyapunov_functions(desk: Desk, runs: Sequence[tuple[str, str]]) -> Figure:
 
 
 def _lyapunov(desk: Desk, file: str, law: str) -> Any:
-    """V at each sample of a flight."""
+    """Return V at each sample of a flight."""
     run, loop = desk.recording(file, law), desk.loop(file, law)
     q, rate = (tuple(np.asarray(run[name]).T) for name in ("attitude_error", "rate_error"))
     given: Any = Measurement(q, rate, rate, ZERO, ZERO, ZERO, ZERO, loop.period)
@@ -211,7 +213,7 @@ def _lyapunov(desk: Desk, file: str, law: str) -> Any:
 
 
 def _inertias() -> list[Any]:
-    """Random inertias whose moments differ up to tenfold, in random axes."""
+    """Return random inertias whose moments differ by up to a factor of ten, in random axes."""
     random = np.random.default_rng(RNG)
     inertias: list[Any] = []
     for _ in range(TRIALS):
@@ -223,7 +225,7 @@ def _inertias() -> list[Any]:
 
 
 def _specs(form: str) -> list[tuple[Any, Any]]:
-    """Random inertias, diagonal for form II, with random weights."""
+    """Return random inertias, diagonal for form II, with random weights."""
     random, specs = np.random.default_rng(RNG + 1), []
     for inertia in _inertias():
         if form == "I":

@@ -17,13 +17,13 @@ from starhold.trace.bounds import work
 
 PASSES = 3
 WINDOW = 2000
-"""Calls from the start on over which the mean is taken: 200 s, in which predictive control arrives."""
+"""The number of calls, from the start on, for the mean: those of 200 s, in which predictive control reaches the target."""
 SHOWN = (0.8, 700.0)
-"""Horizons that a figure shows."""
+"""The range of horizons in a figure."""
 
 
 class Timed(NamedTuple):
-    """A law whose calls are timed: where it is flown, and how many calls are timed at once, and in all."""
+    """A law whose calls are timed: its scenario file and name, the number of calls timed at once, and that of all calls."""
 
     file: str
     law: str
@@ -42,8 +42,8 @@ TIMED = {
 
 
 def call_times(desk: Desk) -> dict[str, NDArray[np.float64]]:
-    """Processor time of a call (s) in each chunk of the first calls of a flight, (chunks,) by the names of TIMED: the least
-    of several passes, in which the laws take turns."""
+    """Return the processor time (s) per call in each chunk of the first calls of a flight, (chunks,) by the names of TIMED:
+    the minimum over several passes, in which the laws alternate."""
 
     def make() -> dict[str, NDArray[np.float64]]:
         times: dict[str, NDArray[np.float64]] = {}
@@ -87,27 +87,27 @@ def total_time(desk: Desk, name: str) -> Finding:
 
 
 def time_ratio(desk: Desk, name: str) -> Finding:
-    """The time of a law's call in Lyapunov calls."""
+    """Return the time of a law's call divided by that of a Lyapunov call."""
     return Finding(ratio(desk, name))
 
 
 def time_cases(desk: Desk, names: Sequence[str], least: float, most: float = float("inf")) -> Finding:
-    """Return for which laws a call takes between `least` and `most` times as long as one of the Lyapunov law."""
+    """Return for each law whether a call takes between `least` and `most` times as long as one of the Lyapunov law."""
     ratios = {name: ratio(desk, name) for name in names}
     note = ", ".join(f"{name} {value:.2g} times" for name, value in ratios.items())
     return Finding({name: least < value < most for name, value in ratios.items()}, note)
 
 
 def operations(desk: Desk, law: str, gravity: bool) -> int:
-    """Additions, multiplications, divisions and roots of one call, from the measured state to the limited torque; `gravity`:
-    whether there is a gravity torque, which a law may have to compute."""
+    """Return the number of additions, multiplications, divisions and roots in one call, from the measured state to the
+    limited torque; gravity: whether there is a gravity torque, which a law may have to compute."""
     loop = desk.loop("three-laws", law, None if gravity else {"environment.gravity_gradient": False})
     program = replay(make_step(loop.composition()), loop.carry(), Numbers.of(loop.phases(1)[0]))
     return work(program, {"first": 0, "count": 1}).work.arithmetic
 
 
 def operations_ratio(desk: Desk) -> Finding:
-    """The operations of a sliding call as a share of those of a Lyapunov call."""
+    """Return the number of operations in a sliding call as a share of those in a Lyapunov call."""
     sliding, lyapunov = operations(desk, "sliding", True), operations(desk, "lyapunov", True)
     return Finding(sliding / lyapunov, f"{sliding} operations by {lyapunov}")
 
@@ -122,20 +122,20 @@ def fewer_operations(desk: Desk, law: str, than: str, factor: float = 1.0) -> Fi
 
 
 def call_figure(desk: Desk, names: Mapping[str, str], unit: str = "ns", scale: float = 1e9) -> Figure:
-    """The time of a call over the time of the flight: labels by the names of TIMED."""
+    """Return a figure of the time per call over the time of the flight; names: labels by the names of TIMED."""
     times = call_times(desk)
     alone, curves = len(names) == 1, list[Curve]()
     for name, label in names.items():
         middle = 0.1 * TIMED[name].chunk * (np.arange(len(times[name])) + 0.5)
         curves.append(Curve(middle, scale * times[name], label, "line" if alone else "steps"))
-    # Other work of the machine shows as spikes.
+    # Other work on the machine causes spikes.
     span = (0.0, 1.5 * float(np.quantile(curves[0].y, 0.95))) if alone else None
     return Figure([Panel("time, s", f"time of a call, {unit}", curves, y_span=span, log_y=not alone)])
 
 
 def horizon_figure(desk: Desk, weighted: Mapping[str, Any], printed: Mapping[str, Any], published: float) -> Figure:
-    """Steps to stay within 10^-3, and how many Lyapunov calls a call costs, over the horizon: with a terminal weight and by
-    the functional as printed. Both map horizons to [file, law]."""
+    """Return a figure, over the horizon, of the steps to stay within 10^-3 and of the time per call relative to a Lyapunov
+    call: with a terminal weight and with the functional as printed. Both arguments map horizons to [file, law]."""
     groups = {"with terminal weight": weighted, "as printed": printed}
     steps: list[Curve] = []
     times: list[Curve] = []

@@ -20,12 +20,12 @@ COMMON = "three-laws"
 
 
 def skew(a: Any) -> Array:
-    """[a]x (3, 3) of a (3,)."""
+    """Return the cross-product matrix [a]x (3, 3) of a (3,)."""
     return np.array(vector.skew(a))
 
 
 def near_the_target(desk: Desk, degrees: float = 1.0) -> Finding:
-    """Return whether the Lyapunov law turns the short way from rest, a little off the target, for either sign of Q."""
+    """Return for both signs of Q whether the Lyapunov law takes the shorter rotation from rest near the target."""
     half = np.radians(degrees) / 2.0
     verdicts: dict[str, bool] = {}
     notes: list[str] = []
@@ -39,8 +39,8 @@ def near_the_target(desk: Desk, degrees: float = 1.0) -> Finding:
 
 
 def target_motion(desk: Desk, cases: int = 100) -> Finding:
-    """The largest relative errors of the two formulas (10) over random motions of a target: of the rate from the vector part
-    as printed, and of the acceleration from E."""
+    """Return the largest relative errors of the two formulas (10) over random motions of a target: of the rate computed from
+    the vector part as printed, and of the acceleration computed from E."""
     random: Any = np.random.default_rng(1)
     printed: list[float] = []
     by_e: list[float] = []
@@ -50,7 +50,7 @@ def target_motion(desk: Desk, cases: int = 100) -> Finding:
         first: Any = np.array(derivative(q, rate))
         second = np.add(derivative(first, rate), derivative(q, acceleration))
         block = q[0] * np.eye(3) + skew(q[1:])
-        # E has the scalar below.
+        # E has the scalar part last.
         e = np.vstack([block, -q[1:]])
         printed.append(float(np.linalg.norm(2.0 * block @ first[1:] - rate) / np.linalg.norm(rate)))
         by_formula = 2.0 * e.T @ np.array([*second[1:], second[0]])
@@ -60,8 +60,8 @@ def target_motion(desk: Desk, cases: int = 100) -> Finding:
 
 
 def on_the_surface(desk: Desk, cases: int = 2000) -> Finding:
-    """Return whether V_e' = q'K q' is negative on the surface w = -K q, at random attitudes by the sign of q0, and at the
-    start."""
+    """Return whether V_e' = q'K q' is negative on the surface w = -K q, at random attitudes with either sign of q0, and at
+    the published start."""
     gain = desk.scenario(COMMON).pick("sliding").gains.surface_gain[0]
     random = np.random.default_rng(2)
     attitudes = random.normal(size=(cases, 4))
@@ -80,7 +80,8 @@ def on_the_surface(desk: Desk, cases: int = 2000) -> Finding:
 
 
 def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
-    """Return whether V_r' = s (M - g sign s) <= 0 for random s and M within the condition (21): as printed, and of |M|."""
+    """Return whether V_r' = s (M - g sign s) <= 0 for random s and M that satisfy the condition (21): as printed, and with
+    |M|."""
     random = np.random.default_rng(3)
     s, torque = random.normal(size=cases), random.normal(size=cases)
     bound = random.uniform(0.0, 2.0, size=cases)
@@ -91,8 +92,8 @@ def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
 
 
 def gravity_block(desk: Desk, cases: int = 20) -> Finding:
-    """The factor that the gravity block of the printed matrix lacks: differences of the torque with the vector part of a
-    small turn of the body, against (mu/R^5) ([R]J - [JR]) [R] at random attitudes."""
+    """Return the factor missing in the gravity block of the printed matrix: the derivative of the torque with respect to the
+    vector part of a small turn, compared with (mu/R^5) ([R]J - [JR]) [R] at random attitudes."""
     craft = desk.loop(COMMON, "mpc").craft
     moments, random = tensor(craft.inertia), np.random.default_rng(4)
     factors: list[float] = []
@@ -113,8 +114,9 @@ def gravity_block(desk: Desk, cases: int = 20) -> Finding:
 
 
 def one_step(desk: Desk, of: Mapping[str, Mapping[str, Any]]) -> Finding:
-    """Return whether x + h (A_c x + B u) predicts the state (q; w) a control period later, within a tenth of what it moves,
-    under predictive control. of: cases by name; `step`: whether h is the control period, or 1 as printed; `changes`."""
+    """Return whether x + h (A_c x + B u) predicts the state (q; w) one control period later under predictive control, to
+    within a tenth of its change. of: cases by name, with `step`, the h (the control period, or 1 as printed), and
+    `changes`."""
     errors: dict[str, float] = {}
     for name, case in of.items():
         loop = desk.loop(COMMON, "mpc", case.get("changes"))
@@ -127,5 +129,5 @@ def one_step(desk: Desk, of: Mapping[str, Mapping[str, Any]]) -> Finding:
         slope[3:] += np.linalg.solve(inertia, control)
         predicted = before + (loop.period if case["step"] else 1.0) * slope
         errors[name] = float(np.linalg.norm(predicted - after) / np.linalg.norm(after - before))
-    note = "off by, as a share of what the state moves: " + ", ".join(f"{name} {off:.2g}" for name, off in errors.items())
+    note = "error as a share of the state's change: " + ", ".join(f"{name} {off:.2g}" for name, off in errors.items())
     return Finding({name: error < 0.1 for name, error in errors.items()}, note)

@@ -1,4 +1,4 @@
-"""Compares flights of the three laws with the statements of the publication, and draws them as it does."""
+"""Compares flights of the three laws with the statements of the publication, and makes its figures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -24,20 +24,20 @@ COMMON = "three-laws"
 
 
 def gains(desk: Desk) -> Finding:
-    """The gains of Table 1, as they fly: k_w, k_q, K, Q, R."""
+    """Return the gains of Table 1 as flown: k_w, k_q, K, Q, R."""
     lyapunov, sliding, mpc = (desk.scenario(COMMON).pick(law).gains for law in LAWS)
     return Finding([lyapunov.k_rate, lyapunov.k_attitude, sliding.surface_gain[0], mpc.q_attitude[0], mpc.r[0]])
 
 
 def first_command(desk: Desk, file: str, law: str, component: bool = False) -> Finding:
-    """Measure a law's command at the start, before any limit (N m): the norm, or the largest component."""
+    """Return a law's command (N m) at the start, before any limit: its norm or its largest component."""
     command = desk.recording(file, law)["command"][0]
     size = np.abs(command).max() if component else np.linalg.norm(command)
     return Finding(float(size), f"about the axes {np.round(command, 5).tolist()}")
 
 
 def gravity_torque(desk: Desk) -> Finding:
-    """The largest norm that the gravity torque can have (N m): 3 mu/R^3 times half the difference of the extreme moments."""
+    """Return the largest norm (N m) of the gravity torque: 3 mu/R^3 times half the difference of the extreme moments."""
     craft = desk.loop(COMMON, "lyapunov").craft
     moments = np.linalg.eigvalsh(tensor(craft.inertia))
     radius = float(np.linalg.norm(desk.recording(COMMON, "lyapunov")["position"], axis=1).min())
@@ -57,14 +57,14 @@ def _listed(values: Mapping[str, float], unit: str = "") -> str:
 
 
 def smooth(desk: Desk) -> Finding:
-    """Return whether the Lyapunov torque changes little from call to call, beside the sliding torque."""
+    """Return whether the Lyapunov torque changes little from call to call compared with the sliding torque."""
     steps = {law: float(np.abs(np.diff(desk.recording(COMMON, law)["torque"], axis=0)).max()) for law in LAWS[:2]}
-    return Finding(steps["lyapunov"] < 0.02 * steps["sliding"], "largest change a call: " + _listed(steps, "N m"))
+    return Finding(steps["lyapunov"] < 0.02 * steps["sliding"], "largest change per call: " + _listed(steps, "N m"))
 
 
 def alternates(desk: Desk, of: Mapping[str, Sequence[str]], quantity: str, least: float = 0.95) -> Finding:
-    """Return whether every component changes sign at nearly every call in the last 150 s: of the torque, or of the
-    increments of the rate. of: file and law by the names of cases."""
+    """Return whether every component of the torque, or of the increments of the rate, changes sign at nearly every call in
+    the last 150 s. of: file and law by the names of cases."""
     shares: dict[str, float] = {}
     for name, (file, law) in of.items():
         run = desk.recording(file, law)
@@ -75,7 +75,7 @@ def alternates(desk: Desk, of: Mapping[str, Sequence[str]], quantity: str, least
 
 
 def worse_with_noise(desk: Desk) -> Finding:
-    """Return whether each law ends further from the target with noise than without, in flights as long."""
+    """Return whether each law ends further from the target with noise than without, after flights of equal length."""
     pairs = {
         law: (_final(desk, COMMON, law, {"simulation.duration": 600.0}), _final(desk, f"{COMMON}-noise", law))
         for law in LAWS
@@ -85,8 +85,8 @@ def worse_with_noise(desk: Desk) -> Finding:
 
 
 def pattern(desk: Desk, files: Mapping[str, str], least: float) -> Finding:
-    """Return whether the torque with noise follows that without: the correlation of means over 5 s in the first 200 s, the
-    least of the laws, by the names of readings."""
+    """Return whether the torque with noise follows that without, by the correlation of means over 5 s in the first 200 s,
+    the least over the laws, for each interpretation of the noise."""
 
     def means(file: str, law: str) -> Array:
         return np.asarray(desk.recording(file, law)["torque"])[:2000].reshape(40, 50, 3).mean(axis=1).ravel()
@@ -100,8 +100,9 @@ def pattern(desk: Desk, files: Mapping[str, str], least: float) -> Finding:
 
 
 def sooner(desk: Desk, of: Sequence[Mapping[str, Any]], factor: float = 1.0) -> Finding:
-    """Tell for each case whether the first flight stays within an accuracy after fewer steps than `factor` times those of
-    the second; one that never does comes last. Each has a name, a metric, and two flights (file, law, perhaps changes)."""
+    """Return for each case whether the first flight stays within an accuracy after fewer steps than `factor` times those of
+    the second; a flight that never does counts as slower. A case has a name, a metric, and two flights (file, law, changes
+    if any)."""
     verdicts: dict[str, bool] = {}
     notes: list[str] = []
     for one in of:
@@ -118,8 +119,8 @@ def _count(steps: Any) -> str:
 
 
 def least_accurate(desk: Desk, of: Sequence[Mapping[str, Any]], law: str) -> Finding:
-    """Return in which cases a law ends further from the target than both others; each has a name, and the file and the law
-    for every law."""
+    """Return for each case whether a law ends further from the target than both others; a case has a name, and the file and
+    the name of every law."""
     verdicts: dict[str, bool] = {}
     notes: list[str] = []
     for one in of:
@@ -130,20 +131,20 @@ def least_accurate(desk: Desk, of: Sequence[Mapping[str, Any]], law: str) -> Fin
 
 
 def same_after(desk: Desk, law: str, bound: float, short: float) -> Finding:
-    """Return whether the step after which the error stays within a bound is the same in a flight that ends sooner (s)."""
+    """Return whether the step after which the error stays within a bound is the same in a flight cut off at `short` (s)."""
     _, error = _deviation(desk, COMMON, law)
     cut, whole = stays_within(error[: int(10.0 * short) + 1], bound), stays_within(error, bound)
     return Finding(cut == whole, f"{_count(cut)} after {short:.0f} s, {_count(whole)} in the end")
 
 
 def _deviation(desk: Desk, file: str, law: str, until: float = np.inf) -> tuple[Array, Array]:
-    """Times of a flight, and |q| at these."""
+    """Return the times of a flight and |q| at these."""
     time, error = samples(desk, file, law, "attitude_error", until)
     return time, np.linalg.norm(error[:, 1:], axis=1)
 
 
 def quotients(desk: Desk, totals: Sequence[float], calls: int) -> Finding:
-    """Totals by the number of calls."""
+    """Return the totals divided by the number of calls."""
     return Finding([total / calls for total in totals])
 
 
@@ -151,8 +152,8 @@ def quotients(desk: Desk, totals: Sequence[float], calls: int) -> Finding:
 
 
 def plans(desk: Desk, file: str, law: str, instants: Sequence[int], until: float) -> Figure:
-    """The attitude that predictive control predicts at some control instants, and the moves that it plans, with those
-    flown."""
+    """Return a figure of the attitudes that predictive control predicts at some control instants and the torques that it
+    plans, with the flown ones."""
     from starhold.laws.mpc import program
     from starhold.laws.predictive.problem import carve
 
@@ -184,8 +185,8 @@ def with_detail(
     detail: Sequence[float],
     scale: float = 1.0,
 ) -> Figure:
-    """The components of a recorded quantity, a panel each, and below each its detail between two instants (s); the
-    upper panels end with the later."""
+    """Return a figure with a panel per component of a recorded quantity, up to the later of two instants (s), and below each
+    its detail between them."""
     run = desk.recording(file, law)
     time, values = run["time"], scale * np.asarray(run[quantity])
     first, last = detail
@@ -199,14 +200,14 @@ def with_detail(
 
 
 def fall(desk: Desk, of: Mapping[str, Sequence[str]], until: float, levels: Sequence[float] = ()) -> Figure:
-    """|q| over time of several flights: file and law by their names."""
+    """Return a figure of |q| over time for several flights, given by name as file and law."""
     flown = {name: _deviation(desk, file, law, until) for name, (file, law) in of.items()}
     curves = [Curve(time, np.maximum(error, 1e-9), name) for name, (time, error) in flown.items()]
     return Figure([Panel("time, s", "|q|", curves, log_y=True, levels=levels)])
 
 
 def by_gain(desk: Desk, least: float, most: float, count: int, limits: Mapping[str, str]) -> Figure:
-    """The steps that the sliding law takes, and where it ends, over its switching torque."""
+    """Return a figure of the steps that the sliding law takes, and of its final error, over its switching torque."""
     from starhold.studies.sweep import sweep
 
     values = np.geomspace(least, most, count)
@@ -227,7 +228,7 @@ def by_gain(desk: Desk, least: float, most: float, count: int, limits: Mapping[s
 
 
 def by_period(desk: Desk, periods: Sequence[float], duration: float) -> Figure:
-    """Where each law ends after a flight of some length, over the control period."""
+    """Return a figure of the final error of each law after a flight of this duration (s), over the control period."""
     curves: list[Curve] = []
     for law in LAWS:
         flights = [{"simulation.duration": duration, "simulation.control_period": h} for h in periods]
@@ -237,7 +238,7 @@ def by_period(desk: Desk, periods: Sequence[float], duration: float) -> Figure:
 
 
 def noise_figure(desk: Desk, files: Mapping[str, str]) -> Figure:
-    """|q| over time of each law, a panel each reading of the noise."""
+    """Return a figure of |q| over time for each law, with a panel per interpretation of the noise."""
     lines = {name: [Curve(*_deviation(desk, file, law), law) for law in LAWS] for name, file in files.items()}
     drawn = [Panel("time, s", "|q|", curves, name, y_span=(1e-4, 1.5), log_y=True) for name, curves in lines.items()]
     return Figure(drawn, columns=3)

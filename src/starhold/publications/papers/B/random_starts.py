@@ -1,5 +1,5 @@
-"""Counts control steps over random starts: until the error stays below a bound, as in the campaign, and to the first
-passage."""
+"""Counts control steps from random starts: until the error stays below a bound, as in the campaign, and until it first
+passes the bound."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,11 +20,11 @@ FILE = "random-starts"
 LAWS = ("lyapunov", "sliding", "mpc")
 PREFIXES = {"attitude": "", "rate": "rate_"}
 PASSAGES = 16
-"""Starts whose first passages are counted."""
+"""The number of starts for which first passages are counted."""
 
 
 def counts(desk: Desk, kind: str) -> dict[str, Array]:
-    """The steps after which the error stays within 10^-1 to 10^-6, (starts, 6) by law; inf where it never does."""
+    """Return the steps after which the error stays within 10^-1 to 10^-6, (starts, 6) by law; inf where it never does."""
 
     def make() -> dict[str, Array]:
         frame: Any = desk.campaign(FILE).frame()
@@ -35,7 +35,7 @@ def counts(desk: Desk, kind: str) -> dict[str, Array]:
 
 
 def first_passages(desk: Desk, kind: str) -> dict[str, Array]:
-    """The steps after which the error is within 10^-1 to 10^-6 for the first time, likewise, of the first starts."""
+    """Return, in the same form for the first starts, the steps after which the error is first within 10^-1 to 10^-6."""
 
     def make() -> dict[str, dict[str, Array]]:
         steps, frame = desk.scenario(FILE).table.simulation.steps, desk.campaign(FILE).frame()
@@ -62,20 +62,20 @@ def first_passages(desk: Desk, kind: str) -> dict[str, Array]:
 
 
 def _passages(run: Recording) -> list[list[float]]:
-    """The first passages of attitude and of rate in a flight."""
+    """Return the first passages of attitude and of rate in a flight."""
     errors = np.linalg.norm(run["attitude_error"][:, 1:], axis=1), np.linalg.norm(run["rate_error"], axis=1)
     return [[first_within(error, 10.0**-k) for k in DECADES] for error in errors]
 
 
 def first_within(error: Array, bound: float) -> float:
-    """The index at which an error is within a bound for the first time; inf where it never is."""
+    """Return the index at which an error is first within a bound; inf where it never is."""
     inside = np.flatnonzero(error <= bound)
     return float(inside[0]) if inside.size else float("inf")
 
 
 def steps_figure(desk: Desk, kind: str) -> Figure:
-    """The steps over the order of the deviation: medians, the middle four fifths of the starts, and first passages; and the
-    share of the starts that stay within."""
+    """Return a figure, over the order of the deviation, of the steps (medians, 10 % and 90 % quantiles, first passages) and
+    of the share of starts that stay within it."""
     steps, first = counts(desk, kind), first_passages(desk, kind)
     orders = np.array(DECADES, dtype=float)
     curves: list[Curve] = []
@@ -99,7 +99,7 @@ def _drawn(steps: Array) -> Array:
 
 
 def medians(desk: Desk, kind: str, first: bool = False) -> dict[str, Array]:
-    """The medians of the counts, (6,) by law."""
+    """Return the medians of the counts, (6,) by law."""
     steps = first_passages(desk, kind) if first else counts(desk, kind)
     return {law: _quantile(steps[law]) for law in LAWS}
 
@@ -109,7 +109,7 @@ def _quantile(steps: Array, share: float = 0.5) -> Array:
 
 
 def fewest(desk: Desk, kind: str, law: str, against: Sequence[str], orders: Sequence[int], first: bool = False) -> Finding:
-    """Tell to which accuracies a law takes fewer steps than others, by the medians over random starts."""
+    """Return for each accuracy whether a law takes fewer steps than others, by the medians over random starts."""
     steps = medians(desk, kind, first)
     cases = {f"to 10^-{k}": all(steps[law][k - 1] < steps[other][k - 1] for other in against) for k in orders}
     note = "; ".join(f"{one}: {', '.join(_count(steps[one][k - 1]) for k in orders)}" for one in (law, *against))
@@ -117,7 +117,7 @@ def fewest(desk: Desk, kind: str, law: str, against: Sequence[str], orders: Sequ
 
 
 def rises(desk: Desk, law: str, orders: dict[str, int], factor: float) -> Finding:
-    """Return whether the step from one accuracy to the next costs a law more than `factor` times what it costs the others;
+    """Return whether going from one accuracy to the next takes a law more than `factor` times as many steps as the others;
     orders: the k reached, for attitude and for rate."""
     cases: dict[str, bool] = {}
     notes: list[str] = []

@@ -1,4 +1,5 @@
-"""The closed loop of the publication on reaction wheels, its regions of gains and its optimum, which no scenario holds."""
+"""The closed loop of the publication on reaction wheels, its regions of gains and its optimum, as computed outside
+scenarios."""
 
 from collections.abc import Sequence
 from itertools import permutations
@@ -20,18 +21,18 @@ from starhold.synthesis.stability_degree import boundary, brute_force, degree, d
 RNG = 2012
 TRIALS = 400
 WEAK = 0.002
-"""The torque that the wheel about y has left after its fault (N m)."""
+"""The largest torque (N m) of the wheel about y after its fault."""
 EXAMPLE = ((1.0, 1.5, 2.0), 0.5, 0.3, 2.0)
 """Ratios of the moments, largest angle (rad), largest rate and budget, in the publication's units."""
 
 
 def closed_loop(desk: Desk, file: str, law: str) -> Finding:
-    """Return whether the flight of a law obeys (9), by differences of its recorded rates; the first wheel fault ends it."""
+    """Return whether the flight of a law satisfies (9) up to the first wheel fault, by differences of its recorded rates."""
     whole = {"fault": None}
     run, loop = desk.recording(file, law, whole), desk.loop(file, law, whole)
     q, rate, time = (np.asarray(run[name]) for name in ("attitude_error", "rate_error", "time"))
     slope = (rate[2:] - rate[:-2]) / (time[2:] - time[:-2])[:, None]
-    # The torque is held over a period, so the torque at a sample's middle is the mean of two commands.
+    # The torque is held over a period, so the central difference at a sample corresponds to the mean of two commands.
     restoring = loop.gains.k_rate * rate + np.asarray(loop.gains.k_attitude) * 4.0 * q[:, :1] * q[:, 1:]
     acting = 0.5 * (restoring[1:-1] + restoring[:-2])
     off = float(np.abs(slope @ tensor(loop.craft.inertia) + acting).max() / np.abs(acting).max())
@@ -50,7 +51,7 @@ def roots_match(desk: Desk) -> Finding:
         printed = np.concatenate([(-damping + inside) / (2.0 * ratios), (-damping - inside) / (2.0 * ratios)])
         eigenvalues = np.linalg.eigvals(matrix)
         worst = max(worst, max(float(np.abs(eigenvalues - root).min()) for root in printed))
-    # Where two roots meet, eigenvalues have half the digits.
+    # At a double root eigenvalues are accurate to half the digits only.
     return Finding(worst < 1e-6, f"{TRIALS} trials: at most {worst:.0e} apart")
 
 
@@ -60,14 +61,14 @@ def first_region(desk: Desk) -> Finding:
 
 
 def fourth_region(desk: Desk) -> Finding:
-    """Return whether (22) is the degree of stability in the last region of (20), where none does."""
+    """Return whether (22) is the degree of stability in the last region of (20), where no axis oscillates."""
     return _in_region(
         lambda s1, s2, k: np.sqrt(8.0 * (1.0 + s2) * k) * 1.3, lambda s1, s2, k, w: 0.5 * (w - np.sqrt(w * w - 8.0 * k))
     )
 
 
 def middle_regions(desk: Desk) -> Finding:
-    """Return whether the degree of stability in the second and third regions is (21) or (22), the lesser of both."""
+    """Return whether the degree of stability in the second and third regions is the smaller of (21) and (22)."""
     return _in_region(
         lambda s1, s2, k: np.sqrt(8.0 * k * (1.0 + 0.7 * s2)),
         lambda s1, s2, k, w: min(w / (2.0 * (1.0 + s2)), 0.5 * (w - np.sqrt(w * w - 8.0 * k))),
@@ -75,7 +76,7 @@ def middle_regions(desk: Desk) -> Finding:
 
 
 def curve_in_second(desk: Desk) -> Finding:
-    """Return for which moments the curve (23) lies in the second region of (20)."""
+    """Return for each set of moments whether the curve (23) lies in the second region of (20)."""
     verdicts: dict[str, bool] = {}
     for s1, s2 in ((0.1, 0.5), (0.4, 0.5), (0.2, 0.6), (0.1, 0.9), (0.8, 0.9)):
         square = 1.0 / boundary((1.0, 1.0 + s1, 1.0 + s2))
@@ -84,7 +85,7 @@ def curve_in_second(desk: Desk) -> Finding:
 
 
 def printed_optimum(desk: Desk) -> Finding:
-    """Return for which orders of the moments (25), taken as it is printed, gives the largest degree of stability."""
+    """Return for each order of the moments whether (25) as printed gives the largest degree of stability."""
     verdicts: dict[str, bool] = {}
     for order in permutations((1.0, 1.5, 2.0)):
         x, y, z = order
@@ -99,8 +100,8 @@ def printed_optimum(desk: Desk) -> Finding:
 
 
 def general_optimum(desk: Desk) -> Finding:
-    """Return whether the formula of the smallest and the largest moment is the optimum in any order of the moments, against
-    a search over all gains."""
+    """Return whether the formula with the smallest and the largest moment gives the optimum for any order of the moments,
+    compared with a search over all gains."""
     random, worst = np.random.default_rng(RNG), 0.0
     for _ in range(25):
         ratios, alpha, omega, budget = _ratios(random), *random.uniform((0.1, 0.0, 0.5), (3.0, 1.0, 4.0)).tolist()
@@ -131,7 +132,7 @@ def degree_after(desk: Desk, file: str, law: str) -> Finding:
 
 
 def within_torque(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
-    """Return which laws demand no more of the weak wheel than it has, at every sample after the fault."""
+    """Return for each law whether it demands no more torque than the weak wheel has, at every sample after the fault."""
     verdicts, notes = dict[str, bool](), list[str]()
     for law in laws:
         time, command = samples(desk, file, law, "wheel_command")
@@ -142,14 +143,14 @@ def within_torque(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
 
 
 def settles(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
-    """Return which laws fail to settle."""
+    """Return for each law whether it fails to settle."""
     times = {law: desk.flight(file, law).metrics["settling_time"] for law in laws}
     note = ", ".join(f"{law} after {time:.0f} s" for law, time in times.items() if time is not None)
     return Finding({law: time is None for law, time in times.items()}, f"settles: {note}")
 
 
 def globally(desk: Desk) -> Finding:
-    """Return whether the law's torque vanishes at the required attitude alone: it does so at every half turn, too."""
+    """Return whether the law's torque vanishes only at the required attitude; in fact it vanishes half a turn away too."""
     random, gains = np.random.default_rng(RNG), wheel.Gains(1.0, (1.0, 1.0, 1.0))
     craft, torques = desk.loop("three-wheels", desk.scenario("three-wheels").laws[0].name).craft, []
     for axis in random.normal(size=(50, 3)):
@@ -160,7 +161,7 @@ def globally(desk: Desk) -> Finding:
 
 
 def tait_bryan(desk: Desk, file: str, laws: Sequence[str], until: float) -> Figure:
-    """Yaw, pitch and roll from the orbital frame over time, a panel a law."""
+    """Return a figure of yaw, pitch and roll from the orbital frame over time, with a panel per law."""
     panels: list[Panel] = []
     for law in laws:
         time, error = (part[::5] for part in samples(desk, file, law, "attitude_error", until))
@@ -171,8 +172,8 @@ def tait_bryan(desk: Desk, file: str, laws: Sequence[str], until: float) -> Figu
 
 
 def regions(desk: Desk) -> Figure:
-    """The plane of the gains of the example: the regions (20), the curve (23), the line (24), and gains of equal degree of
-    stability."""
+    """Return a figure of the plane of gains of the example: the regions (20), the curve (23), the line (24), and contours of
+    the degree of stability."""
     ratios, alpha, omega, budget = EXAMPLE
     best = optimum(ratios, alpha, omega, budget)
     top = 1.7 * best.K_w
@@ -182,7 +183,7 @@ def regions(desk: Desk) -> Figure:
     curves.append(Curve((budget - omega * K_w) / (2.0 * alpha), K_w, "(24), the wheels' torque", hue=1))
     for share in (0.4, 0.7, 1.0):
         eta, b, a = share * best.eta, max(ratios), min(ratios)
-        # The set of at least this degree: right of a corner on (23).
+        # The set with at least this degree lies to the right of a corner on (23).
         corner, rise = 2.0 * b * eta, np.linspace(2.0 * b * eta, top, 100)
         x = np.concatenate([[2.2 * best.K_a, 0.5 * (2.0 * b - a) * eta**2], 0.5 * (rise * eta - a * eta**2)])
         curves.append(Curve(x, np.concatenate([[corner, corner], rise]), f"η = {eta:.3f}", "dotted", 2))
@@ -202,7 +203,7 @@ def _on_line(share: float, alpha: float, omega: float, budget: float) -> float:
 
 
 def _ratios(random: Any) -> Any:
-    """Moments in units of the first, of a possible body."""
+    """Return the moments of a random possible body in units of the first."""
     while True:
         moments = random.uniform(0.4, 2.0, 3)
         if moments.max() < moments.sum() - moments.max():
@@ -210,7 +211,7 @@ def _ratios(random: Any) -> Any:
 
 
 def _in_region(damping: Any, formula: Any) -> Finding:
-    """Compare a formula with the degree of stability, at random sigma1 <= sigma2 and stiffness."""
+    """Return whether a formula equals the degree of stability, at random sigma1 <= sigma2 and stiffness."""
     random, worst = np.random.default_rng(RNG), 0.0
     for _ in range(TRIALS):
         s1, s2 = np.sort(random.uniform(0.0, 1.0, 2))

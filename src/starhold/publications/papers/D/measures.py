@@ -1,5 +1,5 @@
-"""Measures of this publication's slews: the roots that slew fastest within limits, the fits through them, the printed slew,
-and the effects of the control period and of external torque on it. Those of its linear model are in `placement`."""
+"""Measures of this publication's slews: the roots that slew fastest within limits, fits through them, the printed slew, and
+the effects of the control period and of external torque on it. Measures of its linear model are in `placement`."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,21 +24,21 @@ from starhold.trace.straight_line import evaluated
 
 DEGREES = 180.0 / math.pi
 SHORT = 0.002
-"""Seconds of a control step that stands for the limit h -> 0 where roots are searched to 0.001."""
+"""The control step (s) that approximates the limit h -> 0 where roots are searched to 0.001."""
 POINTS = {"below": (10.0, 45.0, 85.0), "above": (85.0, 135.0, 180.0)}
-"""Angles (deg) that each piece of the published fit goes through."""
+"""The angles (deg) of the points through which each piece of the published fit passes."""
 TIGHT = 0.997
-"""Share of a limit above which it is the one that decides."""
+"""The share of a limit above which the limit counts as binding."""
 
 
 def searched(desk: Desk) -> Study:
-    """The search of the built-in scenario `landing-limits`: every 5 degrees, every root of [-3, 0) to 0.001."""
+    """Return the search of the built-in scenario `landing-limits`: every 5 degrees, every root of [-3, 0) to 0.001."""
     scenario = desk.scenario("landing-limits")
     return desk.once(("searched",), lambda: study(scenario, pick_modal(scenario, "published")))
 
 
 def fine_roots(desk: Desk) -> dict[float, float]:
-    """The best roots (1/s) at the published fit's points (deg), the control held for no longer than SHORT."""
+    """Return the best roots (1/s) at the points (deg) of the published fit, with the torque held for SHORT at most."""
 
     def make() -> dict[float, float]:
         angles = sorted({angle for points in POINTS.values() for angle in points})
@@ -51,14 +51,14 @@ def fine_roots(desk: Desk) -> dict[float, float]:
 
 
 def through(angles: ArrayLike, roots: ArrayLike) -> tuple[float, float, float]:
-    """The c, d, e of the curve c exp(d angle) + e, with d < 0, through three points (rad, 1/s) that flatten out."""
+    """Return c, d, e of the curve c exp(d angle) + e, with d < 0, through three points (rad, 1/s) of decreasing slope."""
     x, y = np.asarray(angles, dtype=float), np.asarray(roots, dtype=float)
 
     def misses(d: float) -> float:
         first, second, third = np.exp(d * (x - x[0]))
         return float((first - second) * (y[1] - y[2]) - (second - third) * (y[0] - y[1]))
 
-    # Beyond these ends the second step is negligible beside the first, or the curve is a line.
+    # Beyond these ends the second step is negligible compared with the first, or the curve is a line.
     root: Any = brentq(misses, -50.0 / (x[2] - x[0]), -1e-6, xtol=1e-13)
     d = float(root)
     c = float((y[0] - y[1]) / (np.exp(d * x[0]) - np.exp(d * x[1])))
@@ -77,12 +77,13 @@ def coefficients(desk: Desk, piece: str) -> Finding:
 
 
 def in_whole_steps(desk: Desk, piece: str, step: float) -> Finding:
-    """The numbers of a piece from roots whose times are counted in whole steps (s), the slowest taken of those that tie."""
+    """Return the numbers of a piece from roots whose times are counted in whole steps (s); of tied roots the slowest
+    counts."""
     return _piece(_counted(desk, step), piece)
 
 
 def no_other_step(desk: Desk, steps: Sequence[float]) -> Finding:
-    """Return whether no other step (s) of counted times gives all six printed numbers."""
+    """Return whether times counted in any other step (s) fail to give all six printed numbers."""
     printed = np.array([PUBLISHED.below, PUBLISHED.above])
     fits = {step: three_point_fit(_counted(desk, step)) for step in steps}
     giving = [step for step, f in fits.items() if (np.abs(np.array([f.below, f.above]) - printed) < 5e-4).all()]
@@ -114,7 +115,8 @@ def least_squares(desk: Desk) -> Finding:
 
 
 def which_limit(desk: Desk) -> Finding:
-    """Return whether the acceleration decides up to 85 degrees and the rate beyond, at every angle that was searched."""
+    """Return whether the acceleration limit is binding up to 85 degrees and the rate limit beyond, at every angle
+    searched."""
     limits, results = _limits(desk), searched(desk).results
     decides: list[bool] = []
     for item in results:
@@ -141,7 +143,8 @@ def inside_the_interval(desk: Desk) -> Finding:
 
 
 def printed_fit_flies(desk: Desk) -> Finding:
-    """Return whether turns with the printed fit's roots keep the limits, also with the least tolerances printed."""
+    """Return whether slews with the printed fit's roots keep the limits, without and with the smallest printed
+    tolerances."""
     scenario, search = desk.scenario("landing-limits"), searched(desk)
     problem, hard = problem_of(scenario, scenario.pick("published")), _limits(desk)
     eased = Limits(hard.rate + math.radians(2.0), hard.acceleration + math.radians(3.0))
@@ -158,7 +161,8 @@ def printed_fit_flies(desk: Desk) -> Finding:
 
 
 def roots_over_angle(desk: Desk) -> Figure:
-    """The best roots, with the printed fit, the one through our roots at its points, and the least-squares one."""
+    """Return a figure of the best roots with the printed fit, the fit through our roots at its points, and the least-squares
+    fit."""
     best = searched(desk)
     assert best.fitted is not None
     at = best.angles * DEGREES
@@ -188,7 +192,7 @@ def times_over_angle(desk: Desk) -> Figure:
 
 
 def start(desk: Desk) -> Finding:
-    """The initial angle (deg) of the printed turn."""
+    """Return the initial angle (deg) of the printed slew."""
     attitude = np.array(desk.recording("landing", "rounded")["attitude_error"])[0]
     return Finding(float(error_angle(attitude)) * DEGREES)
 
@@ -199,7 +203,7 @@ def fitted_root(desk: Desk) -> Finding:
 
 
 def turn(desk: Desk, law: str, wanted: Sequence[str], changes: Mapping[str, Any] | None = None) -> Finding:
-    """Numbers of a turn: "time" (s), "rate" (deg/s), "accelerations" (deg/s2, three)."""
+    """Return numbers of a slew: "time" (s), "rate" (deg/s), "accelerations" (deg/s2, three)."""
     flown = desk.flight("landing", law, changes).metrics
     numbers: dict[str, list[float]] = {
         "time": [flown["transient_time"]],
@@ -215,7 +219,7 @@ def limits_kept(desk: Desk) -> Finding:
 
 
 def one_root_for_all(desk: Desk, peaks: Sequence[str], time: str) -> Finding:
-    """Return whether one of the roots that round to -0.428 gives all printed peaks, digit by digit, and none of them the
+    """Return whether some root that rounds to -0.428 gives all printed peaks, digit by digit, but no such root the printed
     time."""
     scenario = desk.scenario("landing", {"simulation.control_period": 0.001})
     roots = np.linspace(-0.4285, -0.4275, 101)
@@ -229,14 +233,14 @@ def one_root_for_all(desk: Desk, peaks: Sequence[str], time: str) -> Finding:
 
 
 def faster_root(desk: Desk) -> Finding:
-    """Return whether the root searched for this very start ends the turn sooner within the limits."""
+    """Return whether the root searched for exactly this start ends the slew sooner within the limits."""
     ours, fit = (desk.flight("landing", law).metrics for law in ("searched", "fit"))
     note = f"a = −0.454: {ours['transient_time']:.2f} s, {ours['peak_rate'] * DEGREES:.2f} °/s"
     return Finding(bool(ours["limits_kept"] and ours["transient_time"] < fit["transient_time"] - 1.0), note)
 
 
 def scalar_root(desk: Desk, share: float) -> Finding:
-    """Return whether the transient with b = -0.01 is within a share of that with hardly any b."""
+    """Return whether the transient time with b = -0.01 differs by less than a share from that with a negligible b."""
     time, without = (
         desk.flight("landing", "rounded", {"law.rounded.b": b}).metrics["transient_time"] for b in (-0.01, -1e-6)
     )
@@ -257,7 +261,7 @@ def periods(desk: Desk, seconds: Sequence[float]) -> Finding:
 
 
 def period_of_linear_motion(desk: Desk, at_least: float) -> Finding:
-    """Return whether the linear motion near rest is proved stable for every period up to some seconds."""
+    """Return whether the linear motion near rest is proved stable for every control period up to `at_least` (s)."""
     claim = desk.claims("landing", "rounded")["sampling"]
     longest = claim.numbers["longest"]
     return Finding(
@@ -275,8 +279,8 @@ def over_periods(desk: Desk, seconds: Sequence[float]) -> Figure:
 
 
 def known_torque(desk: Desk) -> Finding:
-    """Return whether the error that is left under the gravity gradient is less than a thousandth of the one that this torque
-    would leave if the law did not know it."""
+    """Return whether the residual error under the gravity gradient is less than a thousandth of the error that this torque
+    would cause if the law did not know it."""
     scenario = desk.scenario("known-torque")
     inertia, orbit = tensor(scenario.craft.inertia), np.array(desk.recording("known-torque", "modal")["position"])[-1]
     # At the target the body's axes are the inertial ones.
@@ -288,7 +292,7 @@ def known_torque(desk: Desk) -> Finding:
 
 
 def unknown_torque(desk: Desk) -> Finding:
-    """Return whether the error that an unknown torque leaves is 2 asin |J^-1 M / 2a^2|."""
+    """Return whether the residual error under an unknown torque M is 2 asin |J^-1 M / 2a^2|."""
     scenario = desk.scenario("unknown-torque")
     torque = np.array(next(part for part in scenario.parts if part.name == "constant-torque").params.torque)
     left = _left(tensor(scenario.craft.inertia), torque, _root(scenario))
@@ -297,7 +301,7 @@ def unknown_torque(desk: Desk) -> Finding:
 
 
 def inside_the_region(desk: Desk) -> Finding:
-    """Return whether the printed start is inside the sets that are proved, however the quaternion's sign is chosen."""
+    """Return whether the printed start is inside the proved sets for every quaternion sign policy."""
     run = desk.recording("landing", "rounded")
     attitude, rate = (tuple(np.array(run[name])[0].tolist()) for name in ("attitude_error", "rate_error"))
     measured = Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0)
@@ -312,7 +316,7 @@ def inside_the_region(desk: Desk) -> Finding:
 
 
 def _counted(desk: Desk, step: float) -> dict[float, float]:
-    """The best roots (1/s) at the published points (deg) by times in whole steps (s), the slowest of those that tie."""
+    """Return the best roots (1/s) at the published points (deg) by times in whole steps (s), the slowest of tied ones."""
 
     def make() -> dict[float, tuple[NDArray[np.float64], NDArray[np.float64]]]:
         limits, times = _limits(desk), dict[float, tuple[NDArray[np.float64], NDArray[np.float64]]]()
@@ -343,7 +347,7 @@ def _held(desk: Desk, period: float) -> dict[str, Any]:
 
 
 def _left(inertia: NDArray[np.float64], torque: NDArray[np.float64], a: float) -> float:
-    """The angle (rad) at which the law balances a torque (3,) that it does not know: 2a^2 q = J^-1 M."""
+    """Return the angle (rad) at which the law balances an unknown torque M (3,; N m): 2a^2 q = J^-1 M."""
     return 2.0 * math.asin(float(np.linalg.norm(np.linalg.solve(inertia, torque))) / (2.0 * a * a))
 
 

@@ -1,4 +1,4 @@
-"""The publication's linear model, its levels and its regulators are compared with placement by the general algorithm."""
+"""Compares the publication's linear model, levels and regulators with pole placement by the general algorithm."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple, TypeAlias
@@ -19,15 +19,15 @@ Array: TypeAlias = NDArray[np.float64]
 
 RNG = 1074
 TRIALS = 40
-"""Random states, bodies and spectra that each identity is tried on."""
+"""The number of random states, bodies and spectra on which each identity is tested."""
 EXACT = 1e-9
-"""Relative error up to which two formulas count as the same."""
+"""The relative error up to which two formulas count as equal."""
 ONE, NONE = np.eye(3), np.zeros((3, 3))
 
 
 class Case(NamedTuple):
-    """A state at the beginning of a control step, a body there, and the torque on it but for the control's: attitude (4,),
-    rate (3,) in rad/s, inertia (3, 3) in kg m2, torque (3,) in N m and its Jacobian (3, 7) by attitude and rate."""
+    """A state at the beginning of a control step, a body, and the torque on it without control: attitude (4,), rate (3,) in
+    rad/s, inertia (3, 3) in kg m2, torque (3,) in N m and its Jacobian (3, 7) with respect to attitude and rate."""
 
     attitude: Array
     rate: Array
@@ -76,7 +76,7 @@ def skew(v: Array) -> Array:
 
 
 def cases(count: int = TRIALS) -> Iterator[tuple[Case, Spectra]]:
-    """Random states, bodies and torques, each with random real spectra, not diagonal."""
+    """Yield random states, bodies and torques, each with random spectra: real, non-diagonal matrices."""
     random = np.random.default_rng(RNG)
     for _ in range(count):
         attitude = random.normal(size=4)
@@ -93,7 +93,7 @@ def cases(count: int = TRIALS) -> Iterator[tuple[Case, Spectra]]:
 
 
 def regulators(case: Case, spectra: Spectra) -> tuple[Array, Array, Array]:
-    """K_2 (3, 1), K_1 (3, 4) and K_0 (3, 7) as (4.9), (4.10) and (4.11) print them."""
+    """Return K_2 (3, 1), K_1 (3, 4) and K_0 (3, 7) as printed in (4.9), (4.10) and (4.11)."""
     w, jd = case.rate[:, None], case.straighten
     phi_0, phi_1, last = spectra.phi_0, spectra.phi_1, 4.0 * spectra.phi_2 / float(case.rate @ case.rate)
     p, q = -(phi_0 + phi_1), phi_0 @ phi_1
@@ -112,7 +112,8 @@ def regulators(case: Case, spectra: Spectra) -> tuple[Array, Array, Array]:
 
 
 def single_root_regulator(case: Case, a: float, b: float = -0.01) -> Array:
-    """K (3, 7) as (5.1) prints it for the root a (1/s), with b = -0.01 s written out as such."""
+    """Return K (3, 7) as printed in (5.1) for the root a (1/s), with the b = -0.01 that is written out there as a
+    parameter."""
     w, jd, square = case.rate[:, None], case.straighten, float(case.rate @ case.rate)
     d = ONE + skew(case.attitude[1:])
     return case.jacobian + np.hstack(
@@ -125,7 +126,7 @@ def single_root_regulator(case: Case, a: float, b: float = -0.01) -> Array:
 
 
 def closed_loop(case: Case, a: float, b: float = -0.01) -> Array:
-    """The derivative of the rate (3,), rad/s2, as (5.2) prints it."""
+    """Return the derivative of the rate (3,), rad/s2, as printed in (5.2)."""
     q0, q, w = case.attitude[0], case.attitude[1:], case.rate
     k = 2.0 * a * (1.0 - 2.0 * a * b) * (q0 - 1.0) + 0.5 * (1.0 - 8.0 * a * b) * (w @ q) + b * q0 * (w @ w)
     back = np.linalg.inv(ONE + skew(q))
@@ -133,7 +134,7 @@ def closed_loop(case: Case, a: float, b: float = -0.01) -> Array:
 
 
 def model_at_the_start_of_a_step(desk: Desk) -> Finding:
-    """Return how far A x + B u + N xi is from the derivative that (1.1) and (1.4) give at the state itself."""
+    """Return the difference of A x + B u + N xi from the derivative by (1.1) and (1.4) at the state itself."""
     worst = 0.0
     for case, _ in cases():
         (a, b), u = case.model(), 50.0 * case.rate
@@ -145,7 +146,7 @@ def model_at_the_start_of_a_step(desk: Desk) -> Finding:
 
 
 def gyroscopic_sign(desk: Desk) -> Finding:
-    """Return which sign of w x J w, counted among the torques, makes the motion (1.1) under (3.2) that of (5.2)."""
+    """Return for which sign of w x J w among the torques the motion (1.1) under (3.2) equals that of (5.2)."""
     worst = {"−ω × Jω, as (1.1) wants it": 0.0, "ω × Jω, as printed": 0.0}
     for case, spectra in cases():
         gyroscopic = np.cross(case.rate, case.inertia @ case.rate)
@@ -158,8 +159,8 @@ def gyroscopic_sign(desk: Desk) -> Finding:
 
 
 def controllable(desk: Desk) -> Finding:
-    """Tell by the levels, each of which takes some poles, whether the pair of (3.1) is controllable while the body turns,
-    and at rest."""
+    """Return, by the numbers of poles placed at the levels, whether the pair of (3.1) is controllable while the body
+    rotates, and at rest."""
     turning = [levels(*case.model()) == [3, 3, 1] for case, _ in cases()]
     resting = [_controllable(case._replace(rate=np.zeros(3))) for case, _ in cases()]
     verdicts = {"while the body turns": all(turning), "at rest, where turns begin and end": any(resting)}
@@ -167,13 +168,13 @@ def controllable(desk: Desk) -> Finding:
 
 
 def unstable_by_itself(desk: Desk) -> Finding:
-    """Return whether A has an eigenvalue on the right for some bodies and torques."""
+    """Return whether A has an eigenvalue in the right half-plane for some bodies and torques."""
     right = sum(float(np.linalg.eigvals(case.model()[0]).real.max()) > 1e-6 for case, _ in cases())
     return Finding(right > 0, f"{right} of {TRIALS} random states")
 
 
 def pseudo_inverse_formulas(desk: Desk) -> Finding:
-    """Return whether (B'B)^-1 B', B'(BB')^-1 and B^-1 are the pseudo-inverse, which a singular-value decomposition gives."""
+    """Return whether (B'B)^-1 B', B'(BB')^-1 and B^-1 equal the pseudo-inverse by a singular-value decomposition."""
     random, worst = np.random.default_rng(RNG), 0.0
     for _ in range(TRIALS):
         tall, square = random.normal(size=(7, 3)), random.normal(size=(3, 3))
@@ -206,13 +207,14 @@ def printed_levels(desk: Desk) -> Finding:
 
 
 def classical_algorithm(desk: Desk) -> Finding:
-    """Return whether the last level has more inputs than states, so that its B has no full column rank."""
+    """Return whether the last level has more inputs than states, so that its B does not have full column rank."""
     sizes = [levels(*case.model())[-1] for case, _ in cases()]
     return Finding(all(size == 1 for size in sizes), "one pole for three inputs")
 
 
 def inverse_of_the_skeleton(desk: Desk) -> Finding:
-    """Return whether (4.7) is the pseudo-inverse of T_2, and (4.8) an inverse that breaks the one rule it may."""
+    """Return whether (4.7) is the pseudo-inverse of T_2, and (4.8) a generalised inverse that violates only the condition
+    that it may."""
     kept = {"(4.7) is the pseudo-inverse": True, "(4.8) keeps (4.5) and all of (4.2) but one symmetry": True}
     for case, _ in cases():
         jd, w = case.straighten, case.rate[:, None]
@@ -233,8 +235,8 @@ def inverse_of_the_skeleton(desk: Desk) -> Finding:
 
 
 def placed_poles(desk: Desk, level: int) -> Finding:
-    """Return how far the poles that the printed regulator of a level gives are from the spectra of that level and those
-    below it: the error of the characteristic polynomial's partial fractions, of 512 binary digits."""
+    """Return the error of the poles under the printed regulator of a level, relative to the spectra of this and lower
+    levels, by partial fractions of the characteristic polynomial with 512 bits."""
     worst = 0.0
     for case, spectra in cases():
         a, b = case.model()
@@ -248,7 +250,7 @@ def placed_poles(desk: Desk, level: int) -> Finding:
 
 
 def general_placement(desk: Desk) -> Finding:
-    """Return how far (4.11) is from the gain that the general algorithm computes from numbers alone, with (4.8) given."""
+    """Return the difference of (4.11) from the gain that the general algorithm computes numerically, with (4.8) given."""
     worst = 0.0
     for case, spectra in cases():
         turned = case.straighten @ case.rate[:, None]
@@ -259,7 +261,7 @@ def general_placement(desk: Desk) -> Finding:
 
 
 def single_root(desk: Desk) -> Finding:
-    """Return how far (5.1) is from (4.11) with the spectra that section 5 chooses."""
+    """Return the difference of (5.1) from (4.11) with the spectra chosen in section 5."""
     worst = 0.0
     for case, spectra in cases():
         a = spectra.phi_2
@@ -269,7 +271,7 @@ def single_root(desk: Desk) -> Finding:
 
 
 def loop_of_the_law(desk: Desk) -> Finding:
-    """Return how far the motion under the law that flies here, and under (3.2) with (5.1), is from (5.2)."""
+    """Return the differences from (5.2) of the motion under the law `modal` and under (3.2) with (5.1)."""
     worst = {"(3.2) with (5.1)": 0.0, "the law `modal`": 0.0}
     for case, spectra in cases():
         a, craft = spectra.phi_2, make_craft(case.inertia)
@@ -313,7 +315,7 @@ def _controllable(case: Case) -> bool:
 
 
 def _apart(value: Any, wanted: Any) -> float:
-    """The largest difference, as a share of the largest number."""
+    """Return the largest difference, as a share of the largest number."""
     return float(np.abs(value - wanted).max() / np.abs(wanted).max())
 
 

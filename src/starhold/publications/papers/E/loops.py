@@ -17,7 +17,7 @@ from starhold.publications.verdicts import Finding
 from starhold.studies.phase_portraits import paths, portraits
 
 WINDOW = ((-1.5, 3.5), (-2.0, 2.5))
-"""The span of figure 1, by the numbers on its axes."""
+"""The ranges of x and y in figure 1, from the numbers on its axes."""
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-11, "max_step": 0.05}
 
 
@@ -31,14 +31,14 @@ def rates(x: float, y: float) -> tuple[float, float]:
 
 
 def constant(x: Any, y: Any) -> Any:
-    """Return c, which a loop of (2.2) keeps."""
+    """Return c, which is constant on a loop of (2.2)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(y > 0.0, (x * x + y * y) / (2.0 * x), (2.0 * x + y) ** 2 / (8.0 * (x + y)))
 
 
 def flown(start: Sequence[float], until: float, near: float = 0.0, far: float = 1e9) -> Any:
-    """Integrate (2.2) to a time (negative: backwards), or until it is so near the origin or so far off. Returns times (m,),
-    states (2, m)."""
+    """Integrate (2.2) to a time (negative: backwards), or until the distance from the origin is `near` or `far`. Returns
+    times (m,) and states (2, m)."""
     from scipy.integrate import solve_ivp
 
     def ends(_: float, state: Any) -> float:
@@ -51,13 +51,13 @@ def flown(start: Sequence[float], until: float, near: float = 0.0, far: float = 
 
 
 def draws(count: int, seed: int = 1) -> Any:
-    """States of the window of figure 1 (count, 2)."""
+    """Return random states (count, 2) in the window of figure 1."""
     low, high = np.array(WINDOW).T
     return np.random.default_rng(seed).uniform(low, high, (count, 2))
 
 
 def phi(x: Any, y: Any) -> Any:
-    """Return the printed function whose zero line is the border of the loops."""
+    """Return the printed function whose zero line is the boundary of the loops."""
     return np.where(y > 0.0, (x - 1.0) ** 2 + y * y - 1.0, (2.0 * x + y) ** 2 - 8.0 * (x + y))
 
 
@@ -90,7 +90,7 @@ def largest_level(desk: Desk, problem: str) -> Finding:
 
 
 def only_equilibrium(desk: Desk) -> Finding:
-    """Return whether rates vanish nowhere but at the origin: x' = y leaves the line y = 0 alone."""
+    """Return whether rates vanish only at the origin: x' = y vanishes only on the line y = 0."""
     places = np.concatenate([-np.geomspace(1e-6, 1e3, 200), np.geomspace(1e-6, 1e3, 200)])
     others = all(rates(float(x), 0.0)[1] != 0.0 for x in places)
     return Finding(others and rates(0.0, 0.0) == (0.0, 0.0), "x' = y vanishes on y = 0 only, where y' = -2x")
@@ -124,7 +124,8 @@ def loops_kept(desk: Desk, count: int) -> Finding:
 
 
 def border(desk: Desk) -> Finding:
-    """Return whether the motion through (2, 0) runs along the zero line of the printed function, from the origin to it."""
+    """Return whether the motion through (2, 0) follows the zero line of the printed function, from the origin to the
+    origin."""
     ahead = flown((2.0, 0.0), 20.0)[1]
     back = flown((2.0, 0.0), -10.0, 1e-3)[1]
     off = max(float(np.abs(phi(*states)).max()) for states in (ahead, back))
@@ -133,7 +134,8 @@ def border(desk: Desk) -> Finding:
 
 
 def slopes(desk: Desk) -> Finding:
-    """Return whether the printed function falls below the axis outside of G and is constant above, as exact identities."""
+    """Return whether outside G the printed function decreases below the axis and is constant above it, as exact
+    identities."""
     x, y = Polynomial.variable("x"), Polynomial.variable("y")
     below, above = (2 * x + y) * (2 * x + y) - 8 * (x + y), (x - 1) * (x - 1) + y * y - 1
 
@@ -145,7 +147,7 @@ def slopes(desk: Desk) -> Finding:
 
 
 def printed_halves(desk: Desk) -> Finding:
-    """Return whether the printed function, zero within G, is an indicator: it would have to be continuous."""
+    """Return whether the printed function, set to zero in G, is an indicator function, for which it must be continuous."""
     read = load("switching")
     x, y = (cast(Any, Polynomial.variable(name)) for name in read.system.names)
     below, above = (2 * x + y) * (2 * x + y) - 8 * (x + y), x * x + y * y - 2 * x
@@ -157,8 +159,7 @@ def printed_halves(desk: Desk) -> Finding:
 
 
 def strict_subsets(desk: Desk, inner: float, wider: float) -> Finding:
-    """Return whether {c <= inner} is stable, and whether it does not attract, by the motion on a wider loop that starts next
-    to it."""
+    """Return whether {c <= inner} is stable and not attracting, by the motion on a wider loop that starts close to it."""
     angle = 1e-3
     start = (wider * (1.0 - np.cos(angle)), wider * np.sin(angle))
     _, states = flown(start, 25.0)
@@ -173,8 +174,8 @@ def strict_subsets(desk: Desk, inner: float, wider: float) -> Finding:
 
 
 def definition(desk: Desk, near: float) -> Finding:
-    """Return whether the origin counts as unstable: by excursions from ever nearer starts, as Lyapunov has it, and by the
-    motion after some time that all starts share, as definition 1 has it."""
+    """Return whether the origin is unstable by two definitions: Lyapunov's, by excursions from ever closer starts, and
+    definition 1, by the motion after a time common to all starts."""
     excursion: list[float] = []
     late: list[float] = []
     for size in (0.1, 0.01, 0.001):
@@ -191,7 +192,7 @@ def definition(desk: Desk, near: float) -> Finding:
 
 
 def figure_1(desk: Desk) -> Figure:
-    """The phase portrait of (2.2), loops and their surroundings."""
+    """Return the phase portrait of (2.2): the loops and their surroundings."""
     starts = [(2.0 * c, 0.0) for c in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)]
     starts += [(-x, 0.0) for x in (0.25, 0.5, 0.75, 1.0, 1.25, 1.45)] + [(2.3, -2.0), (3.0, -2.0)]
 
@@ -211,10 +212,10 @@ def figure_1(desk: Desk) -> Figure:
 
 
 def theorems(desk: Desk) -> Figure:
-    """An example of each theorem: motions, the set, and its certified part."""
+    """Return a figure with an example of each theorem: motions, the set, and its certified part."""
     about = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
     spin = load("spin")
-    # States of one energy about the axis of the largest inertia, seen along it.
+    # States of equal energy near the axis of the largest inertia, viewed along it.
     starts = [(size, np.sqrt(1.0 - size**2 / 3.0), 0.0) for size in (0.2, 0.4, 0.6, 0.8)]
     stable = paths(spin.system, [(-2.0, 2.0)] * 3, np.array(starts).T, 8.0)
     middle = [(0.05 * np.cos(a), 0.05 * np.sin(a), 1.0) for a in about]
@@ -246,7 +247,7 @@ def _panel(title: str, x: str, y: str, lines: Sequence[Any], points: Sequence[tu
 
 
 def _certified(desk: Desk, problem: str, claim: int, starts: Any, title: str) -> Panel:
-    """Motions with the borders of the certified set and of the set itself."""
+    """Return a panel of motions with the boundaries of the certified set and of the set itself."""
     from contourpy import contour_generator
 
     read, made = certificate(desk, problem)

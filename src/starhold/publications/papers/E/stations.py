@@ -1,4 +1,4 @@
-"""Measures of section 3: the linear model, and flights of the equilibrium and the circle beside L2."""
+"""Measures of section 3: the linear model, and flights at the equilibrium and on the circle near L2."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -17,17 +17,17 @@ from starhold.synthesis.circle import best_rate, demand, peak_required, required
 
 REST, EDGE, DEFICIT = "l2-equilibrium", "near-the-edge", "l2-deficit"
 LINES = 0.015
-"""Share of a picture's width that two lines drawn side by side take."""
+"""The width of two adjacent lines as a share of a picture's width."""
 
 
 def plant_of(desk: Desk, C: float | None = None) -> Libration:
-    """Return the point L2 of the Sun and the Earth, with C as printed where it is given."""
+    """Return the point L2 of the Sun and the Earth, with the printed C where it is given."""
     plant = desk.scenario(DEFICIT).craft
     return plant if C is None else plant._replace(stiffness=C)
 
 
 def matrix(plant: Libration, feedback: Callable[[PointMeasurement], Any] | None = None) -> Any:
-    """Return the matrix (6, 6) of the linear model, state position and velocity, with a law that is linear."""
+    """Return the matrix (6, 6) of the linear model for position and velocity, with the feedback of a linear law."""
     zero = PointMeasurement((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, math.inf)
     constant = np.zeros(3) if feedback is None else np.array(feedback(zero))
     whole = np.zeros((6, 6))
@@ -41,7 +41,7 @@ def matrix(plant: Libration, feedback: Callable[[PointMeasurement], Any] | None 
 
 
 def stiffness(desk: Desk) -> Finding:
-    """C of the Sun and the Earth, from their masses and the place of L2."""
+    """Return C of the Sun and the Earth, from their masses and the position of L2."""
     return Finding(plant_of(desk).stiffness, f"without the Moon {PRIMARIES['sun-earth-alone'].point().stiffness:.4f}")
 
 
@@ -61,7 +61,7 @@ def roots(desk: Desk) -> Finding:
 
 
 def feed_forward(desk: Desk, C: float) -> Finding:
-    """Return whether rest beside Y and Z takes (C - Omega^2) rho and C rho."""
+    """Return whether rest at a distance rho along Y and Z takes the control (C - Omega^2) rho and C rho."""
     plant, demands = plant_of(desk, C), {}
     for name in ("beside Y", "beside Z"):
         entry = desk.scenario(REST).pick(name)
@@ -77,7 +77,7 @@ def feed_forward(desk: Desk, C: float) -> Finding:
 
 
 def degree(desk: Desk) -> Finding:
-    """Return whether each axis has a double root, and another damping gives a lesser degree of stability."""
+    """Return whether each axis has a double root, and any other damping gives a smaller degree of stability."""
     entry, plant = desk.scenario(REST).pick("beside Y"), plant_of(desk)
 
     def slowest(gains: Any) -> list[float]:
@@ -92,14 +92,14 @@ def degree(desk: Desk) -> Finding:
 
 
 def _unit(desk: Desk) -> dict[str, Any]:
-    """Changes after which the X axis is flown in the unit form: a limit of Omega^2 + 2 C moves its saddles to one length."""
+    """Return changes that give the X axis its unit form: a limit of Omega^2 + 2 C moves the saddles to a distance of 1."""
     plant = plant_of(desk)
     return {"law.beside Y.limit": plant.rate**2 + 2.0 * plant.stiffness}
 
 
 def saddles(desk: Desk) -> Finding:
-    """Return whether the unit form rests at x = -1 and 1, each with one positive and one negative root, and whether the law
-    has this form."""
+    """Return whether the unit form has equilibria at x = -1 and 1, each with one positive and one negative root, and whether
+    the law has this form."""
     plant, gains = plant_of(desk), desk.scenario(REST).pick("beside Y").gains
     steep = plant.rate**2 + 2.0 * plant.stiffness
     form = max(abs(gains.k_x / steep - 2.0), abs(gains.k_velocity[0] / math.sqrt(steep) - 2.0)) < 1e-12
@@ -112,7 +112,7 @@ def _slope(state: Any) -> Any:
 
 
 def zone_ratio(desk: Desk) -> Finding:
-    """The largest x at rest from which the craft comes back, over that within which the control is linear."""
+    """Return the largest x at rest from which the craft returns, divided by the largest x at which the control is linear."""
     edge = largest(lambda x: desk.flight(REST, "beside Y", {**_unit(desk), "initial.position": [x, 0.0, 0.0]}).lost is None)
     shown = desk.claims(REST, "beside Y")["saturated-axis"]
     share = shown.numbers["width"] / shown.numbers["boundary"]
@@ -120,7 +120,7 @@ def zone_ratio(desk: Desk) -> Finding:
 
 
 def largest(comes_back: Callable[[float], bool], high: float = 2.0, steps: int = 16) -> float:
-    """Return the largest start that comes back, by halving; 0 comes back, `high` does not."""
+    """Return, by bisection, the largest start that comes back; 0 does, `high` does not."""
     low = 0.0
     for _ in range(steps):
         middle = 0.5 * (low + high)
@@ -174,14 +174,14 @@ def falls(desk: Desk) -> Finding:
 
 
 def indicator(desk: Desk) -> Finding:
-    """Return whether the law's certificate proves that the circle attracts, and up to which level of V."""
+    """Return whether the law's certificate proves that the circle attracts, with the level of V."""
     circle = desk.claims("l2-circle", "smooth")["circle"]
     note = f"{circle.outcome} up to V = {circle.numbers['level']:.7g}; on the axis, where V = 0.5, V' is zero too"
     return Finding(circle.outcome == "proved", note)
 
 
 def relay(desk: Desk) -> Finding:
-    """Return whether the relay brings the craft to the circle, with a layer in which it is proportional and without."""
+    """Return whether the relay brings the craft to the circle, with and without a boundary layer."""
     laws = {"with a layer": "relay with layer", "without one": "relay"}
     off = {name: _off(desk.flight("l2-circle", law)) for name, law in laws.items()}
     outcome = desk.claims("l2-circle", "relay")["circle"].outcome
@@ -190,8 +190,8 @@ def relay(desk: Desk) -> Finding:
 
 
 def steepest(desk: Desk) -> Finding:
-    """Return whether the control that makes V' least brings the craft to the circle: of (3.5), and of a V with a pull
-    towards it."""
+    """Return whether the control that minimizes V' brings the craft to the circle, for (3.5) and for a V with a pull towards
+    the circle."""
     changes = {"V with a pull towards the circle": None, "V of (3.5)": {"law.l2-optimal.pull": 1e-9}}
     off = {name: _off(desk.flight("l2-circle", "l2-optimal", change)) for name, change in changes.items()}
     note = "off by " + " and ".join(f"{value:.3f}" for value in off.values()) + " radii after two years"
@@ -223,12 +223,12 @@ def extremes(desk: Desk, C: float) -> Finding:
 
 
 def rate(desk: Desk, C: float) -> Finding:
-    """The rate at which the circle demands least."""
+    """Return the rate at which the circle has the smallest demand."""
     return Finding(best_rate(plant_of(desk, C)))
 
 
 def factor(desk: Desk, C: float) -> Finding:
-    """The peak demand a unit of radius at the best rate, by the printed formula."""
+    """Return the peak demand per unit of radius at the best rate, by the printed formula."""
     plant = plant_of(desk, C)
     turning = best_rate(plant)
     return Finding(demand(turning, plant), f"2 Omega omega, its Coriolis part, is {2.0 * turning:.4f}")
@@ -250,8 +250,7 @@ def coriolis_share(desk: Desk, C: float, least: float) -> Finding:
 
 
 def farthest(desk: Desk) -> Finding:
-    """Return whether the craft comes back to the circle from x near the largest that comes back, towards and away from the
-    Sun."""
+    """Return whether the craft returns to the circle from x close to the largest such x, towards and away from the Sun."""
     dark, sun = (side * largest(lambda x, s=side: _from(desk, s * x).lost is None, 1.0) for side in (1.0, -1.0))
     off = max(_off(_from(desk, 0.99 * x)) for x in (dark, sun))
     note = f"from x = {sun:.3f} to {dark:.3f}; started 1 % within that, off by {off:.4f} radii after two years"
@@ -268,8 +267,8 @@ def _from(desk: Desk, x: float) -> Any:
 
 
 def deficit(desk: Desk, law: str, tells: str) -> Finding:
-    """Return whether under a deficit x is not zero ("x"), the path is not the circle ("circle"), or the control meets its
-    limit again and again ("limit")."""
+    """Return whether under a deficit x is not zero ("x"), the path is not the circle ("circle"), or the control repeatedly
+    saturates ("limit")."""
     flight = desk.flight(DEFICIT, law)
     position, control = flight.recording["position"], flight.recording["command"]
     half = len(position) // 2
@@ -288,7 +287,7 @@ def deficit(desk: Desk, law: str, tells: str) -> Finding:
 
 
 def lag_hours(desk: Desk, lag: float) -> Finding:
-    """Hours of a lag, in the unit of time in which a year has 2 pi."""
+    """Return the duration (h) of a lag given in the unit of time in which a year is 2 pi."""
     time = desk.scenario(DEFICIT).table.libration.units.time
     half_a_day = 43200.0 / time
     return Finding(lag * time / 3600.0, f"12 h are {half_a_day:.4f}, or {half_a_day / (2.0 * math.pi):.4f} of a year")
@@ -301,7 +300,7 @@ def settles(desk: Desk, lag_h: float, days: float, left: float) -> Finding:
 
 
 def alike(desk: Desk, lags: Sequence[float]) -> Finding:
-    """Return for which lags figures 6 and 7 look as without: whether nowhere the lines are two widths apart."""
+    """Return for each lag whether figures 6 and 7 look as they do without it, with lines nowhere two widths apart."""
     notes: list[str] = []
     cases: dict[str, bool] = {}
     for lag in lags:
@@ -321,8 +320,8 @@ def _apart(desk: Desk, file: str, law: str, lag: float) -> float:
 
 
 def farthest_place(path: Any, other: Any) -> float:
-    """Return how far a place of another path (m, 3) is from a path (n, 3) at most, in x, y and in y, z, as a share of the
-    picture."""
+    """Return the largest distance of another path (m, 3) from a path (n, 3), in x, y and in y, z, as a share of the
+    picture's width."""
     from scipy.spatial import KDTree
 
     wide = np.ptp(path, axis=0)
@@ -331,18 +330,18 @@ def farthest_place(path: Any, other: Any) -> float:
 
 
 def figure_6(desk: Desk) -> Figure:
-    """Projections of the motion and of the control with no control to spare, from near the largest x either way."""
+    """Return projections of motion and control at zero control margin, from close to the largest x in both directions."""
     runs = {f"x = {x:g}": _from(desk, x).recording for x in (0.5, -0.22)}
     return Figure([*_planes(runs, desk.scenario(EDGE).pick("circle").options.limit)], 3)
 
 
 def figure_7(desk: Desk, law: str) -> Figure:
-    """Projections as in figure 6, with a deficit and from the circle."""
+    """Return projections as in figure 6, with a deficit and starting on the circle."""
     return Figure(_planes({law: desk.recording(DEFICIT, law)}, desk.scenario(DEFICIT).pick(law).options.limit), 3)
 
 
 def lag_figure(desk: Desk, lags: Sequence[float], after: float) -> Figure:
-    """Figure 7 with and without lags, after a time."""
+    """Return figure 7 with and without lags, from a time on."""
     runs = {"no lag": desk.recording(DEFICIT, "deficit 10")}
     runs |= {f"T = {lag:g}": desk.recording(DEFICIT, "deficit 10", _lagging("deficit 10", lag)) for lag in lags}
     both = ("position", "control")
@@ -351,7 +350,7 @@ def lag_figure(desk: Desk, lags: Sequence[float], after: float) -> Figure:
 
 
 def _planes(runs: dict[str, Any], limit: float) -> list[Panel]:
-    """(x, y), (y, z) with the circle, (u_y, u_z) with the limit, as published."""
+    """Return panels of (x, y) and (y, z) with the circle, and of (u_y, u_z) with the limit, as published."""
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     round_ = np.array([np.cos(turn), np.sin(turn)])
     pairs = (("position", 0, 1), ("position", 1, 2), ("control", 1, 2))

@@ -1,4 +1,4 @@
-"""Measures of sections 3.1 and 3.4: from where the Sun is seen, and how its light gives the control."""
+"""Measures of sections 3.1 and 3.4: the visibility of the Sun, and the control by its light."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ RING = np.array([np.cos(TURN), np.sin(TURN)])
 
 
 def station(specular: float = 1.0) -> Station:
-    """Return the circle of one Earth diameter round L2, with a sail."""
+    """Return the circle with a radius of one Earth diameter around L2, with a sail."""
     return Station(PAIR, "L2", EARTH_DIAMETER, specular)
 
 
@@ -41,7 +41,7 @@ def angles(desk: Desk) -> Finding:
 
 
 def same_angle(desk: Desk) -> Finding:
-    """Return how nearly both discs look equal."""
+    """Return whether both discs look equal, to within a tenth and to within a hundredth."""
     sun, earth = discs()
     share = earth / sun
     ring = 100.0 * station().light(0.0)
@@ -50,7 +50,7 @@ def same_angle(desk: Desk) -> Finding:
 
 
 def clear_offset(desk: Desk) -> Finding:
-    """The offset from which on the whole Sun is seen, in Earth diameters."""
+    """Return the offset, in Earth diameters, beyond which the whole Sun is visible."""
     here = station()
     return Finding(
         here.clear_radius / EARTH_DIAMETER, f"at 1 diameter {100.0 * here.light(EARTH_DIAMETER):.1f} % of the Sun is seen"
@@ -58,11 +58,11 @@ def clear_offset(desk: Desk) -> Finding:
 
 
 def lit_share(desk: Desk, count: int) -> Finding:
-    """Return whether the formula for equal discs is the share of points of one disc that the other leaves free."""
+    """Return whether the formula for equal discs gives the share of points of one disc that the other does not cover."""
     side = (np.arange(count) + 0.5) / count * 2.0 - 1.0
     x, y = np.meshgrid(side, side)
     inside = x * x + y * y < 1.0
-    # Offsets in radii of the Earth: the discs' centres are as many of their radii apart.
+    # Offsets are in Earth radii, which equal the distance of the discs' centres in disc radii.
     offsets = np.linspace(0.0, 2.0, 9)
     free = [float(((x - s) ** 2 + y * y >= 1.0)[inside].mean()) for s in offsets]
     off = float(np.abs(np.array(free) - sails.lit(offsets)).max())
@@ -70,8 +70,8 @@ def lit_share(desk: Desk, count: int) -> Finding:
 
 
 def mirror_force(desk: Desk) -> Finding:
-    """Return whether the push on a mirror is p S cos g (1 + cos 2g)/cos g along its normal, 2 p S cos^2 g, by the momentum
-    of the light that turns."""
+    """Return whether the force on a mirror is p S cos g (1 + cos 2g)/cos g = 2 p S cos^2 g along its normal, by the momentum
+    of the reflected light."""
     sail, off = sails.make_sail(4.5e-6, 150.0, 300.0), 0.0
     for cone in np.linspace(0.0, 1.5, 31):
         setting = sails.Setting(sail.area, float(cone), 0.7)
@@ -87,7 +87,7 @@ def mirror_force(desk: Desk) -> Finding:
 
 
 def ball(desk: Desk) -> Finding:
-    """Return whether a ball of controls is within reach: every vector of its border is given by area and two angles."""
+    """Return whether a ball of controls is attainable: every vector on its boundary is given by an area and two angles."""
     sail = sails.make_sail(4.5e-6, 150.0, 300.0)
     reach, off, most = sails.reach(sail), 0.0, 0.0
     for lean in np.linspace(0.0, np.pi, 25):
@@ -103,7 +103,7 @@ def ball(desk: Desk) -> Finding:
 
 
 def shifted(desk: Desk) -> Finding:
-    """Return whether the linear model stays as it is under a steady push, about a place nearer to the Sun."""
+    """Return whether the linear model is unchanged under a constant push, about a point closer to the Sun."""
     plant, push = station().plant, 2.3
     back = push / (plant.rate**2 + 2.0 * plant.stiffness)
     draw = np.random.default_rng(5)
@@ -117,7 +117,7 @@ def shifted(desk: Desk) -> Finding:
 
 
 def area(desk: Desk, low: float, high: float, pressure: float) -> Finding:
-    """Return for which reflectivities the area per mass lies between two numbers (m2/kg), at a pressure (N/m2)."""
+    """Return for each reflectivity whether the area per mass lies between two numbers (m2/kg), at a pressure (N/m2)."""
     here = station()
 
     def least(mirror: float) -> float:
@@ -132,7 +132,7 @@ def area(desk: Desk, low: float, high: float, pressure: float) -> Finding:
 
 
 def solar_cells(desk: Desk, efficiency: float, most: float) -> Finding:
-    """Return whether solar cells as large as the sail suit a craft of at most so much power per mass (W/kg)."""
+    """Return whether solar cells with the sail's area suit a craft with a power per mass of at most `most` (W/kg)."""
     flux = pressure_at(station().plant.from_larger * EARTH_DIAMETER) * 299_792_458.0
     power = station().area_per_mass() * flux * efficiency
     return Finding(
@@ -141,7 +141,7 @@ def solar_cells(desk: Desk, efficiency: float, most: float) -> Finding:
 
 
 def area_figure(desk: Desk) -> Figure:
-    """Area per mass over the reflectivity."""
+    """Return a figure of the area per mass over the reflectivity."""
     here, mirror = station(), np.linspace(0.4, 1.0, 61)
     areas = [here.area_per_mass(specular=float(one)) for one in mirror]
     panel = Panel("reflectivity", "area per mass, m²/kg", [Curve(mirror, areas)], levels=(0.6, 1.0), y_span=(0.4, 1.3))
@@ -149,9 +149,9 @@ def area_figure(desk: Desk) -> Figure:
 
 
 def fly_sail(desk: Desk, margin: float, lag_h: float, years: float) -> dict[str, Any]:
-    """Fly the circle on a mirror whose two angles lag and whose area follows at once, SciPy's integrator in place of the
-    loop. Returns time (revolutions), position (m, 3; radii), and settings as commanded and as they are (m, 3; share of the
-    area, degrees)."""
+    """Fly the circle with a mirror whose two angles lag and whose area follows at once, by SciPy's integrator instead of the
+    loop. Returns time (revolutions), position (m, 3; radii), and commanded and actual settings (m, 3; share of the area,
+    degrees)."""
     from scipy.integrate import solve_ivp
 
     def make() -> dict[str, Any]:
@@ -164,7 +164,7 @@ def fly_sail(desk: Desk, margin: float, lag_h: float, years: float) -> dict[str,
         def commanded(state: Any) -> sails.Setting:
             measurement = PointMeasurement(tuple(state[:3]), tuple(state[3:6]), 0.0, math.inf)
             command, _ = entry.law.command(measurement, entry.gains, plant, NoMemory())
-            # A hair within the mirror's reach, lest rounding exceed it.
+            # Slightly within the attainable set, so that rounding does not exceed it.
             wanted = clip_norm(scale(units.acceleration, command), reach * (1.0 - 1e-9))
             return sails.steer(wanted, sail)
 
@@ -199,7 +199,7 @@ def fly_sail(desk: Desk, margin: float, lag_h: float, years: float) -> dict[str,
 
 
 def sail_keeps(desk: Desk, margin: float, lags_h: Sequence[float], years: float) -> Finding:
-    """Return whether the circle is kept to a hundredth of its radius by a mirror whose angles lag."""
+    """Return whether a mirror whose angles lag keeps the craft on the circle to within a hundredth of its radius."""
     off: dict[str, float] = {}
     for lag in lags_h:
         position = fly_sail(desk, margin, lag, years)["position"]
@@ -210,7 +210,7 @@ def sail_keeps(desk: Desk, margin: float, lags_h: Sequence[float], years: float)
 
 
 def sail_figure(desk: Desk, margin: float, lag_h: float, years: float) -> Figure:
-    """Area and angles of the mirror over the last revolution, as commanded and as they are."""
+    """Return a figure of the mirror's area and angles over the last revolution, commanded and actual."""
     flown = fly_sail(desk, margin, lag_h, years)
     last = flown["time"] >= flown["time"][-1] - 1.0
     time = flown["time"][last]
@@ -218,7 +218,7 @@ def sail_figure(desk: Desk, margin: float, lag_h: float, years: float) -> Figure
     for k, label in enumerate(("area, share of all", "cone angle, degrees", "clock angle, degrees")):
         commanded, given = flown["asked"][last, k], flown["set"][last, k]
         if k == 2:
-            # Whole turns are left out; the line breaks where a turn ends.
+            # Whole turns are removed; the line has a gap where a turn ends.
             commanded, given = (_broken(np.remainder(angle + 180.0, 360.0) - 180.0) for angle in (commanded, given))
         lines = [Curve(time, commanded, "command"), *([Curve(time, given, "as it is", "dashed")] if k else [])]
         panels.append(Panel("revolutions", label, lines))
@@ -230,7 +230,7 @@ def _broken(angle: Any) -> Any:
 
 
 def figure_2(desk: Desk) -> Figure:
-    """Axes at L2: the line from the Sun through the Earth, to scale, and the circle across it."""
+    """Return a figure of the axes at L2: the line from the Sun through the Earth, to scale, and the circle across it."""
     earth = -station().plant.from_smaller * EARTH_DIAMETER / 1e9
     side = [
         *_arrow((0.0, 0.0), (0.5, 0.0), 1),
@@ -261,7 +261,7 @@ def figure_2(desk: Desk) -> Figure:
 
 
 def _arrow(start: tuple[float, float], end: tuple[float, float], hue: int) -> list[Curve]:
-    """A line with a head."""
+    """Return the curves of an arrow."""
     along = np.subtract(end, start)
     size = float(np.hypot(*along))
     ahead, aside = along / size, np.array([-along[1], along[0]]) / size
@@ -271,7 +271,7 @@ def _arrow(start: tuple[float, float], end: tuple[float, float], hue: int) -> li
 
 
 def figure_3(desk: Desk) -> Figure:
-    """The Sun behind the Earth as the craft sees it at some offsets, and the part of it that is seen."""
+    """Return a figure of the Sun behind the Earth as seen by the craft at some offsets, and of its visible share."""
     here, (sun, earth) = station(), discs()
     panels: list[Panel] = []
     plant = here.plant
@@ -293,7 +293,8 @@ def figure_3(desk: Desk) -> Figure:
 
 
 def figure_5(desk: Desk, margin: float, lag_h: float, years: float) -> Figure:
-    """A mirror that turns the light's push aside, and the pushes within reach, with those that the circle demands."""
+    """Return a figure of a mirror that deflects light sideways, and of the attainable forces, with those that the circle
+    demands."""
     flown = fly_sail(desk, margin, lag_h, years)
     shares = flown["asked"][-400:]
     lean = math.radians(float(shares[:, 1].max()))

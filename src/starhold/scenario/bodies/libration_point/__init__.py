@@ -32,17 +32,17 @@ position = [0.0, 0.5, 0.1]
 duration = 0.1
 """
 NEAR = 0.4
-"""The divergence bound as a share of the nearer body's distance, unless the file gives one."""
+"""The default divergence bound, as a share of the distance to the nearer body."""
 
 
 class Made(NamedTuple):
-    """The numbers of a libration point."""
+    """The scaled numbers of a libration point and their units."""
 
     craft: Libration
 
 
 class Options(NamedTuple):
-    """The control that a law has: its limit, infinite for none, and its lag (scaled)."""
+    """The control available to a law: its limit, infinite if there is none, and its lag (scaled)."""
 
     limit: float
     lag: float
@@ -84,7 +84,7 @@ class LibrationPoint(Body):
         if away >= loop.divergence_bound:
             allowed = f"less than lost_beyond, {loop.divergence_bound:.6g}"
             raise InputError(scenario.where, "initial.position", f"a start {away:.6g} away", allowed)
-        # A law may need all the control available.
+        # A law that uses all the control available cannot do without a limit.
         measurement = PointMeasurement(loop.start.position, loop.start.velocity, loop.period, entry.options.limit)
         command, _ = loop.law.command(measurement, entry.gains, loop.known, loop.carry().memory)
         if not is_finite(dot(command, command)):
@@ -93,7 +93,7 @@ class LibrationPoint(Body):
 
 
 def _limit(scenario: Scenario, law_table: PointLawTable, gains: Any, key: str) -> float:
-    """The largest control (scaled) a law has: from its table, else from [control]."""
+    """Return the largest control acceleration (scaled) of a law, from its own table or else from [control]."""
     where, table = scenario.where, scenario.table
     said, key = (law_table.limits, key) if law_table.limits else (table.control.limits, "control")
     if not said:
@@ -110,7 +110,7 @@ def _limit(scenario: Scenario, law_table: PointLawTable, gains: Any, key: str) -
 
 
 def _start(scenario: Scenario, entry: LawEntry) -> PointState:
-    """The first state; control surfaces that lag start without control."""
+    """Return the initial state; control surfaces with a lag start at zero control."""
     start = scenario.table.initial
     if start.relative_to == "point":
         return PointState(start.position, start.velocity, ZERO)

@@ -1,4 +1,5 @@
-"""The tables of a scenario of station keeping. Plain numbers are scaled: the length unit, and a revolution in 2 pi."""
+"""The tables of a station-keeping scenario. Plain numbers are scaled: by the unit of length, and one revolution takes 2
+pi."""
 
 from __future__ import annotations
 
@@ -55,7 +56,7 @@ class LibrationTable(Table):
         return self
 
     def _check_own(self) -> None:
-        """Raise an error for two given bodies that are impossible."""
+        """Raise an error for an impossible pair of custom bodies."""
         pair = self.pair
         check_gravity("larger", pair.larger)
         check_gravity("smaller", pair.smaller)
@@ -70,7 +71,7 @@ class LibrationTable(Table):
 
     @property
     def pair(self) -> Primaries:
-        """The two bodies."""
+        """The larger and the smaller body."""
         if self.larger is None or self.smaller is None or self.separation is None:
             return PRIMARIES[self.primaries or "sun-earth"]
         return Primaries("two bodies", self.larger, self.smaller, self.separation, 0.0, 0.0)
@@ -82,19 +83,20 @@ class LibrationTable(Table):
 
     @property
     def plant(self) -> Libration:
-        """The numbers of the point."""
+        """The equations' numbers for this libration point."""
         return self.pair.point(self.point, self.length_unit)
 
 
 class Resources(Table):
-    """The limit of the control, given in one of three ways, and its lag."""
+    """The control limit, as `limit`, `margin` or `deficit`, and the lag of the control."""
 
     limit: Annotated[float | None, *scaled("acceleration", Gain("m/s^2", above=0.0, text="largest control"))] = None
     margin: Annotated[
         float | None, *quantity(Gain("1", at_least=0.0, text="share by which the limit exceeds the circle's peak demand"))
     ] = None
     deficit: Annotated[
-        float | None, *quantity(Gain("1", at_least=0.0, at_most=0.99, text="share by which it falls short of that demand"))
+        float | None,
+        *quantity(Gain("1", at_least=0.0, at_most=0.99, text="share by which the limit is below that demand")),
     ] = None
     lag: Annotated[float | None, *scaled("time", Gain("s", at_least=0.0, text="time constant of the control surfaces"))] = (
         None
@@ -102,7 +104,7 @@ class Resources(Table):
 
     @property
     def limits(self) -> dict[str, float]:
-        """The limits given, by key."""
+        """The keys of the limit that the file gives, with their values."""
         given = {"limit": self.limit, "margin": self.margin, "deficit": self.deficit}
         return {key: value for key, value in given.items() if value is not None}
 
@@ -128,7 +130,7 @@ class PointInitial(Table):
         Literal["point", "target"],
         Field(description="origin of position and velocity; target: the law's circle at a phase, or its equilibrium"),
     ] = "point"
-    phase: Annotated[float, *quantity(Gain("rad", text="place on the circle, from Y towards Z"))] = 0.0
+    phase: Annotated[float, *quantity(Gain("rad", text="phase angle on the circle, from Y towards Z"))] = 0.0
     position: Annotated[Any, *scaled("length", Gain("m", shape=(3,), spread=False, text="position"))] = (0.0, 0.0, 0.0)
     velocity: Annotated[Any, *scaled("velocity", Gain("m/s", shape=(3,), spread=False, text="velocity"))] = (0.0, 0.0, 0.0)
 
@@ -137,8 +139,8 @@ class PointTiming(Timing):
     """The duration of a run, its control period and its integration steps."""
 
     duration: Annotated[float, *scaled("time", Gain("s", above=0.0, text="length of the run, in whole control periods"))]
-    control_period: Annotated[float, *scaled("time", Gain("s", above=0.0, text="for which a control is held"))] = 0.001
-    record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps a sample"))] = 10
+    control_period: Annotated[float, *scaled("time", Gain("s", above=0.0, text="time for which a control is held"))] = 0.001
+    record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps per recorded sample"))] = 10
     lost_beyond: Annotated[
         float | None,
         *scaled(
@@ -149,9 +151,9 @@ class PointTiming(Timing):
 
 
 class Near(Table):
-    """When the circle or the equilibrium counts as reached."""
+    """The tolerance within which the circle or the equilibrium counts as reached."""
 
-    tolerance: Annotated[float, *scaled("length", Gain("m", above=0.0, text="distance from it"))] = 0.05
+    tolerance: Annotated[float, *scaled("length", Gain("m", above=0.0, text="distance from circle or equilibrium"))] = 0.05
 
 
 class PointLawTable(LawTable, Resources):
@@ -159,7 +161,7 @@ class PointLawTable(LawTable, Resources):
 
 
 class LibrationPointTable(ScenarioTable):
-    """A whole file, but for its law tables, which are read law by law."""
+    """A scenario file without its law tables, which are read one by one."""
 
     libration: LibrationTable
     control: ControlTable = ControlTable()

@@ -41,7 +41,7 @@ class Options(NamedTuple):
     quaternion_sign: Any
     hysteresis_width: float
     fault_action: str | None
-    """The action on any fault where this law flies; None: the fault's own."""
+    """The reaction of this law to every fault; None for the action that each fault's table states."""
 
 
 class RigidBody(Dials):

@@ -1,5 +1,5 @@
-"""Turns the tables of a spacecraft into the numbers that laws use, its effectors, and the parts for which [wheels],
-[sensor], [environment] and other tables are short forms of [[part]]."""
+"""Turns the tables of a spacecraft into the craft that laws use, its effectors, and the parts that [wheels], [sensor],
+[environment] and other tables declare as short forms of [[part]]."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 LAYOUTS = {"orthogonal": three_orthogonal, "pyramid": pyramid, "nasa-standard": nasa_standard}
 NUMBERS = ("inertia", "torque_limit", "momentum_limit", "viscous", "coulomb")
 FASTEST = 1e4
-"""The speed (rad/s) that no rotor bears: rims of the strongest fibres break at less."""
+"""A speed (rad/s) that no rotor withstands: rims of the strongest fibres burst below it."""
 NONE: dict[str, Any] = {
     "static_friction": 0.0,
     "stribeck_speed": 0.0,
@@ -36,11 +36,11 @@ NONE: dict[str, Any] = {
     "dynamic_imbalance": 0.0,
     "position": (0.0, 0.0, 0.0),
 }
-"""Wheels may have these further numbers; each comes with the value that means none."""
+"""Optional parameters of wheels, each with the value that means its absence."""
 
 
 def written_out(scenario: Scenario, target: Fitted, effectors: tuple[Fitted, ...]) -> tuple[Fitted, ...]:
-    """Return the parts of the scenario in the order in which they act: its target and its effectors, those of its other
+    """Return all parts of the scenario in the order in which they act: the target, the effectors, the parts of the other
     short forms, and those of [[part]] tables."""
     table = scenario.table
     around, noise, body = table.environment, table.sensor, table.spacecraft
@@ -63,7 +63,7 @@ def _where(there: bool, role: str, name: str, *numbers: float) -> tuple[Fitted, 
 
 
 def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
-    """Return the effectors of the tables: their reaction wheels, if any. ValueError says what is missing or impossible."""
+    """Return the effectors of the tables: reaction wheels, if any. ValueError names what is missing or impossible."""
     if table.wheels is None and not table.wheel:
         return ()
     axes, columns, momenta = rotors_in(table)
@@ -73,7 +73,7 @@ def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
         if FASTEST * inertia < most < math.inf:
             speed = f"{most / inertia * 30.0 / math.pi:.3g} rpm"
             raise ValueError(
-                f"wheel {place} turns at {speed} with its most momentum, {most:.3g} N m s: is another unit meant?"
+                f"wheel {place} turns at {speed} at its largest momentum, {most:.3g} N m s: is another unit meant?"
             )
     wheels = make_wheels(axes, **columns)._replace(allocation=ALLOCATIONS.index((table.wheels or WheelsTable()).allocation))
     wheels = mounted(wheels, [_given("mounting_error", rotor, shared) or (0.0, 0.0, 0.0) for rotor in rotors])
@@ -85,8 +85,8 @@ def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
 
 
 def rotors_in(table: RigidBodyTable) -> tuple[list[Any], dict[str, list[Any]], list[Any]]:
-    """Return the axes of the wheels of tables, their numbers by name, and their momenta (N m s), wheel by wheel. ValueError
-    says what is missing."""
+    """Return the axes of the wheels, their parameters by name, and their initial momenta (N m s), one per wheel. ValueError
+    names what is missing."""
     shared, single = table.wheels or WheelsTable(), table.wheel
     axes = [wheel.axis for wheel in single] or list(LAYOUTS[shared.layout or ""]())
     rotors: list[Rotor] = [*single] or [shared] * len(axes)
@@ -97,13 +97,13 @@ def rotors_in(table: RigidBodyTable) -> tuple[list[Any], dict[str, list[Any]], l
 
 
 def _given(name: str, table: Rotor, shared: Rotor) -> Any:
-    """A number of a wheel: its own or what all share, None without either."""
+    """Return a parameter of a wheel from its own table, or else from [wheels]; None where neither gives it."""
     value = getattr(table, name)
     return getattr(shared, name) if value is None else value
 
 
 def _number(name: str, table: Rotor, shared: Rotor, place: int) -> Any:
-    """Return a number of a wheel: its own, its unit's, the shared one, or that of the shared unit."""
+    """Return a parameter of a wheel from the first of its own table, its catalogue unit, [wheels], and the unit there."""
     for given in (table, shared):
         value: Any = getattr(given, name)
         if value is not None:
@@ -122,15 +122,15 @@ def _number(name: str, table: Rotor, shared: Rotor, place: int) -> Any:
 
 
 class Made(NamedTuple):
-    """The numbers of a spacecraft, and the effectors of its tables; with wheels, its inertia is without the rotors' moments
-    about their own axes."""
+    """A spacecraft and its effectors. With wheels, the craft's inertia excludes the rotors' moments of inertia about their
+    spin axes."""
 
     craft: Craft
     effectors: tuple[Fitted, ...]
 
 
 def make(table: RigidBodyTable, where: str) -> Made:
-    """Return the spacecraft of these tables. InputError where it is impossible."""
+    """Return the spacecraft that these tables define. InputError where it is impossible."""
     with input_at(where, "wheel" if table.wheels or table.wheel else "spacecraft"):
         effectors = effectors_in(table)
         return Made(_craft(table, effectors, table.spacecraft.inertia), effectors)
@@ -138,10 +138,10 @@ def make(table: RigidBodyTable, where: str) -> Made:
 
 def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
     """Return the effectors of a scenario's tables, which allocate a torque by the law's model of them. Beside the functions
-    of its role, each has `sure_torque(params, kind)`, the torque (N m) that it can always give, in norm or about each axis
+    of its role, each has `sure_torque(params, kind)`, the torque (N m) that it can always give, in norm or about all axes
     at once; `capacity(own, params)`, the momentum (N m s) that it can still store; `axial_inertia(params)`, the part of the
-    body's inertia (3, 3; kg m2) due to rotors about their axes; and `shared_as(params, known, like)`, its numbers with
-    the allocation among those that laws know.
+    body's inertia (3, 3; kg m2) due to its rotors about their spin axes; and `shared_as(params, known, like)`, its
+    parameters with the allocation that a law computes from the parameters it knows.
     """
     made, supposed = (cast(Made, one.made).effectors for one in (scenario, scenario.known))
     if made is supposed or len(made) != len(supposed):
@@ -158,7 +158,7 @@ def wheels_of(scenario: Scenario) -> Wheels | None:
 
 
 def craft_with(scenario: Scenario, inertia: Any) -> Craft:
-    """Return the scenario's craft with another inertia (3, 3; kg m2), including its wheels; ValueError where it is
+    """Return the scenario's craft with another inertia (3, 3; kg m2), which includes the wheels. ValueError where it is
     impossible."""
     return _craft(scenario.table, effectors_of(scenario), inertia)
 
@@ -178,15 +178,15 @@ def axial_inertia(effectors: tuple[Fitted, ...]) -> Any:
 
 
 def torque_limit(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:
-    """Return the torque on which a law may rely (N m): the limit of [spacecraft] or, where that is less, the torque that the
-    effectors among these parts can always give, by the same measure."""
+    """Return the torque (N m) on which a law may rely: the smaller of the limit of [spacecraft] and the torque that the
+    effectors among these parts can always give, both per axis or both in norm."""
     craft, least = table.spacecraft, sure_torque(table, parts)
     return least if craft.limit == "none" and least < math.inf else min(craft.torque_limit, least)
 
 
 def sure_torque(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:
-    """Return the torque that the effectors among these parts can always give (N m), in norm if the limit of [spacecraft] is
-    a norm, else about each axis at once; infinite if none has such a limit."""
+    """Return the torque (N m) that the effectors among these parts can always give: in norm if the limit of [spacecraft] is
+    a norm, else about all axes at once; infinite if no effector limits it."""
     kind = "norm" if table.spacecraft.limit == "norm" else "axis"
     telling = ((fitted.part.hook("sure_torque"), fitted.params) for fitted in parts)
     return min((tell(params, kind) for tell, params in telling if tell is not None), default=math.inf)

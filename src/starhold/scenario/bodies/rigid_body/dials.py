@@ -1,4 +1,4 @@
-"""Equations of the inertia, limit and start of a spacecraft, which can be moved while its loop stays the same program."""
+"""Equations for the inertia, torque limit and initial state of a spacecraft, which may vary within one loop's program."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ if TYPE_CHECKING:
 Array: TypeAlias = NDArray[np.float64]
 
 KNOWN, TRUE = "spacecraft.inertia", "fault[1].inertia"
-"""The inertia that the laws know, and the craft's own where they do not know it."""
+"""The keys of the inertia that laws know, and of the true inertia where laws do not know it."""
 LIMIT, ATTITUDE, RATE = "spacecraft.torque_limit", "initial.attitude", "initial.rate"
 ANGLES = "initial.angles"
-"""Not a key that may be moved, because there is no sine operation: `moved` takes the quaternion of the angles."""
+"""A key that cannot be varied, because equations have no sine: `moved` takes the quaternion of the angles instead."""
 ROTORS, ORBIT = "wheels", "orbit"
-"""Not keys either: `moved` takes the wheels, and the position and velocity, that the keys of their tables give."""
+"""Entries of `moved` that are not keys: the wheels, and position and velocity, computed from the keys of their tables."""
 
 
 class Dials(Body):
-    """A body whose inertia, limit and start may be moved."""
+    """A body whose inertia, torque limit and initial state may vary from run to run."""
 
     linked = MappingProxyType({TRUE: KNOWN})
 
     def dials(self, scenario: Scenario) -> dict[str, Any]:
-        """Return the keys that may be moved, with their numbers; an attitude given by angles becomes a quaternion, and an
-        infinite limit is left out. With faults or a nominal model nothing may be moved, because no equations give their
+        """Return the keys that may vary, with their values; an attitude given by angles becomes a quaternion, and an
+        infinite limit is left out. With faults or a nominal model there are none, because no equations describe their
         effects."""
         table = scenario.table
         if table.fault or table.nominal:
@@ -60,8 +60,8 @@ class Dials(Body):
         return dials | {ATTITUDE: tuple(map(float, attitude)), RATE: tuple(map(float, table.initial.rate))}
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the changes of a file that give keys these values: an inertia unknown to the laws becomes a fault at the
-        start without a reaction."""
+        """Return the changes of a file that set keys to these values; a true inertia unknown to laws becomes a fault at the
+        start, without a reaction."""
         changes = {key: value for key, value in values.items() if key != TRUE}
         if ATTITUDE in changes:
             changes[ANGLES] = None
@@ -70,7 +70,7 @@ class Dials(Body):
         return changes
 
     def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
-        """Return the numbers of a loop under these values, as from `build` and `make_events`."""
+        """Return the numbers of a loop for these values, equal to those of `build` and `make_events`."""
         nominal, flown = _crafts(scenario, values, loop.craft)
         saturation_limit = values.get(LIMIT, loop.saturation_limit())
         attitude = unit_of(values[ATTITUDE]) if ATTITUDE in values else values.get(ANGLES)
@@ -86,8 +86,8 @@ class Dials(Body):
         return Moved(begun._replace(rate=rate), begun, flown, nominal, saturation_limit, parts)
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Craft:
-        """Return the craft that laws know under these values, which may be recorded ones; InputError where no file may have
-        them."""
+        """Return the craft that laws know for these values, which may be recorded numbers. InputError for values that would
+        be refused in a file."""
         crafts = _crafts(scenario, values, scenario.craft)
         for key, craft in zip((KNOWN, TRUE), crafts, strict=True):
             with input_at("", key):
@@ -102,7 +102,7 @@ class Dials(Body):
 
     def drawn(self, scenario: Scenario, columns: Mapping[str, Array]) -> dict[str, Any]:
         """Return the arguments of `moved`, with an array (lanes,) in place of each number; columns: values (components...,
-        lanes) by key, of whole vectors or of single components. ValueError where lanes differ in more than numbers."""
+        lanes) by key, of whole vectors or of single components. ValueError where lanes do not differ in numbers alone."""
         initial, moved = scenario.table.initial, dict[str, Any]()
         for key, given in ((ATTITUDE, initial.attitude), (ANGLES, initial.angles), (RATE, initial.rate)):
             values = _whole(columns, key, given)
@@ -125,13 +125,13 @@ class Dials(Body):
         return moved if rotors is None else moved | {ROTORS: rotors}
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
-        """Return which lanes have an impossible inertia, wheels or orbit, (lanes,); None where none of them is drawn."""
+        """Return a mask (lanes,) of the lanes with an impossible inertia, wheel or orbit; None where none is drawn."""
         every = (self._refused(scenario, columns), impossible_orbits(scenario, columns))
         known = [lanes for lanes in every if lanes is not None]
         return reduce(np.logical_or, known) if known else None
 
     def _refused(self, scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
-        """Return which lanes have an impossible inertia or impossible wheels, (lanes,); None where neither is drawn."""
+        """Return a mask (lanes,) of the lanes with an impossible inertia or wheel; None where neither is drawn."""
         moments, rotors = _moments(scenario, columns), rotors_over(scenario, columns)
         if moments is None and rotors is None:
             return None
@@ -148,7 +148,7 @@ class Dials(Body):
 
 
 def _crafts(scenario: Scenario, values: Mapping[str, Any], like: Craft) -> tuple[Craft, Craft]:
-    """Return the craft that laws know, and the one that flies, in the form of one like it."""
+    """Return the craft that laws know and the true one, both with the structure of `like`."""
     craft, rotors = scenario.craft, values.get(ROTORS)
     if LIMIT in values or rotors is not None:
         table = scenario.table
@@ -164,7 +164,7 @@ def _crafts(scenario: Scenario, values: Mapping[str, Any], like: Craft) -> tuple
 
 
 def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any, like: Craft, rotors: Rotors | None = None) -> Craft:
-    """Return the craft with another inertia in the form of one like it, including its wheels."""
+    """Return the craft with another inertia, which includes the wheels; the result has the structure of `like`."""
     if not craft.with_rotors:
         return craft._replace(inertia=inertia, inverse_inertia=inverse(inertia))
     axial: Any = axial_inertia(effectors_of(scenario)).tolist() if rotors is None else rotors.axial
@@ -174,7 +174,7 @@ def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any, like: Craft, r
         whole = inertia[i][j] if isinstance(inertia[0], tuple) else inertia[i] if i == j else 0.0
         return whole - axial[i][j]
 
-    # What is zero in the one like it stays zero, because it is only rounding.
+    # Products of inertia that are zero in `like` stay zero: here they are only rounding errors.
     without_rotors: Any = tuple(
         tuple(left(i, j) if form[i][j] != 0.0 else 0.0 for j in range(3)) if isinstance(form[0], tuple) else left(i, i)
         for i in range(3)
@@ -187,8 +187,8 @@ def _moments(scenario: Scenario, columns: Mapping[str, Array]) -> Array | None:
 
 
 def _whole(columns: Mapping[str, Array], key: str, nominal: Any) -> Array | None:
-    """Return the vectors (components, lanes), or matrices, of a key with all or some components drawn; None if none is
-    drawn."""
+    """Return the vectors (components, lanes), or matrices, of a key of which some or all components are drawn; None if none
+    is."""
     if key in columns:
         return columns[key]
     drawn = {name: values for name, values in columns.items() if name.startswith(f"{key}[")}
@@ -201,7 +201,7 @@ def _whole(columns: Mapping[str, Array], key: str, nominal: Any) -> Array | None
 
 
 def _inertia(moments: Array, matrix: bool) -> Any:
-    """Return valid inertias (3, lanes) or (3, 3, lanes) in the form of the craft's."""
+    """Return inertias (3, lanes) or (3, 3, lanes) as the craft has them."""
     if moments.ndim == 2:
         moments = np.eye(3)[:, :, None] * moments
     rows = 0.5 * (moments + moments.swapaxes(0, 1))
@@ -209,5 +209,5 @@ def _inertia(moments: Array, matrix: bool) -> Any:
 
 
 def _principal(inertias: Array) -> NDArray[np.floating[Any]]:
-    """The principal moments (lanes, 3) of inertias (lanes, 3, 3), the least first."""
+    """Return the principal moments (lanes, 3), in increasing order, of inertias (lanes, 3, 3)."""
     return np.linalg.eigvalsh(0.5 * (inertias + inertias.swapaxes(1, 2)))

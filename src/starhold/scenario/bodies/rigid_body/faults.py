@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 
 def action_on(fault: FaultTable, entry: LawEntry) -> str:
-    """The action on a fault where this law flies."""
+    """Return the reaction of a law to a fault."""
     return entry.options.fault_action or fault.action
 
 
 def fault_times(scenario: Scenario) -> tuple[float, ...]:
-    """Return when faults happen and when the reactions follow (s)."""
+    """Return the times (s) of faults and of the reactions to them."""
     faults: list[FaultTable] = scenario.table.fault
     acted = [f.time + f.delay for f in faults if any(action_on(f, entry) != "none" for entry in scenario.laws)]
     return tuple(sorted({*(fault.time for fault in faults), *acted}))
@@ -34,8 +34,8 @@ def fault_times(scenario: Scenario) -> tuple[float, ...]:
 
 def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) -> tuple[Event, ...]:
     """Return the events of a law's run: each fault when it happens, and the reaction when it is diagnosed. InputError where
-    a fault names a wheel that does not exist, or comes after the end, or leaves less inertia than the rotors', or fewer than
-    three axes to a law that must go on, or where new gains are requested for a law that cannot have them.
+    a fault names a wheel that does not exist, happens after the end, leaves the body less inertia than its rotors have,
+    leaves torque about fewer than three axes to a law that continues, or asks for new gains of a law without a design form.
     """
     table, period = scenario.table, scenario.table.simulation.control_period
     moments: list[tuple[float, bool, int]] = []
@@ -58,7 +58,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
             wheels = None if wheels is None else _struck(wheels, fault)
             now = now._replace(parts=_on(now.parts, wheels), craft=body or now.craft)
         else:
-            # A late diagnosis of an inertia that has since changed again is obsolete.
+            # The diagnosis of an inertia that has changed again in the meantime is obsolete.
             if body is not None and (fault.time, place) > learnt:
                 now, learnt = now._replace(nominal=body), (fault.time, place)
             if wheels is not None and fault.strikes_wheel:
@@ -77,7 +77,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
 
 
 def _on(parts: tuple[Fitted, ...], wheels: Wheels | None) -> tuple[Fitted, ...]:
-    """Return the parts with other wheels."""
+    """Return the parts with these wheels in place of theirs."""
     return tuple(replace(f, params=wheels) if f.part.name == "wheels" else f for f in parts)
 
 
@@ -96,7 +96,7 @@ def _index(fault: FaultTable) -> int:
 
 
 def _body(scenario: Scenario, place: int, fault: FaultTable) -> Craft | None:
-    """Return the craft with the fault's inertia, or None if that does not change."""
+    """Return the craft with the inertia after the fault, or None if the fault does not change it."""
     if fault.inertia is None:
         return None
     with input_at(scenario.where, f"fault[{place}].inertia"):
@@ -104,7 +104,7 @@ def _body(scenario: Scenario, place: int, fault: FaultTable) -> Craft | None:
 
 
 def _struck(wheels: Wheels, fault: FaultTable) -> Wheels:
-    """Return the wheels after an undiagnosed fault: the allocation is as before."""
+    """Return the wheels after a fault that is not diagnosed yet: their allocation is unchanged."""
     changes: dict[str, Any] = {}
     given = {
         "torque_limit": 0.0 if fault.lost else fault.torque_limit,
@@ -121,14 +121,14 @@ def _struck(wheels: Wheels, fault: FaultTable) -> Wheels:
 
 
 def _told(gains: Any, wheels: Wheels, fault: FaultTable) -> Any:
-    """Return the gains of a law that knows of a lost wheel: one less is left of those whose loss begins another mode."""
+    """Return the gains of a law after a lost wheel is diagnosed: one fewer has to be lost before its mode on loss begins."""
     if not hasattr(gains, "wheels_lost") or wheels.torque_limit[_index(fault)] > 0.0:
         return gains
     return gains._replace(wheels_lost=gains.wheels_lost - 1.0)
 
 
 def _left(scenario: Scenario, wheels: Wheels, place: int, fault: FaultTable, gains: Any) -> Wheels:
-    """The wheels that a diagnosed fault leaves. Where too few are left but another mode begins, they stay as they are."""
+    """Return the wheels, reallocated after a diagnosed fault; unchanged where too few remain but another mode begins."""
     try:
         return lose(wheels, _index(fault)) if wheels.torque_limit[_index(fault)] == 0.0 else wheels
     except ValueError as error:
@@ -138,7 +138,7 @@ def _left(scenario: Scenario, wheels: Wheels, place: int, fault: FaultTable, gai
 
 
 def _retuned(scenario: Scenario, entry: LawEntry, known: Craft, share: float, place: int) -> Any:
-    """Return the gains designed for the known inertia and for the share of the torque that is left."""
+    """Return the gains redesigned for the known inertia and the remaining share of the torque."""
     key, changed = f"fault[{place}].action", scenario.table.fault[place - 1].inertia is not None
     follows = entry.form is not None and "torque" in entry.spec._fields
     if not follows and (entry.form is None or not changed):

@@ -22,8 +22,8 @@ STATE, SHAPE = ("position", "velocity", "semi_major_axis"), ("eccentricity", *AN
 
 
 def orbits_over(scenario: Scenario, columns: Mapping[str, Array]) -> list[Orbit] | None:
-    """Return the orbits of lanes that differ in the values of some keys, (components..., lanes) by key, unchecked; None
-    where none of these is an orbit's. ValueError where lanes differ in more than where they begin."""
+    """Return the unchecked orbits of lanes that differ in the values of some keys, (components..., lanes) by key; None
+    where none of these is a key of [orbit]. ValueError where lanes differ in more than their initial states."""
     orbit: Orbit | None = scenario.table.orbit
     drawn = {key.removeprefix("orbit."): values for key, values in columns.items() if key.startswith("orbit.")}
     if orbit is None or not drawn:
@@ -32,7 +32,7 @@ def orbits_over(scenario: Scenario, columns: Mapping[str, Array]) -> list[Orbit]
     for key, values in drawn.items():
         name, _, component = key.partition("[")
         if not _may_differ(orbit, name, values):
-            raise ValueError("lanes differ in more of their orbits than where they begin")
+            raise ValueError("lanes differ in more of their orbits than the initial state")
         if component:
             whole = changes.setdefault(name, np.repeat(np.array(getattr(orbit, name))[:, None], lanes, axis=1))
             whole[int(component[:-1]) - 1] = values
@@ -43,7 +43,7 @@ def orbits_over(scenario: Scenario, columns: Mapping[str, Array]) -> list[Orbit]
 
 
 def _may_differ(orbit: Orbit, name: str, values: Array) -> bool:
-    """Return whether lanes with these values of a key have orbits given by the same keys, and no unit is asked for."""
+    """Return whether all lanes may have these plain values of a key of [orbit], which must stay given by the same keys."""
     if name == "altitude" and orbit.altitude is not None:
         low, about = max(AIR, LOWEST * (orbit.surface or 0.0)), body_of(orbit.gravitational_parameter)
         return bool((values > low).all() and (about != "Earth" or (values < FARTHEST).all()))
@@ -57,8 +57,8 @@ def _plain(value: Any) -> Any:
 
 
 def impossible_orbits(scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
-    """Return which lanes have an orbit that a file would be refused for, (lanes,); None where no orbit is drawn, or only
-    reading the file can tell."""
+    """Return a mask (lanes,) of the lanes whose orbit would be refused in a file; None where no orbit is drawn, or where
+    only reading a file decides this."""
     try:
         orbits = orbits_over(scenario, columns)
     except ValueError:
@@ -76,6 +76,6 @@ def impossible_orbits(scenario: Scenario, columns: Mapping[str, Array]) -> NDArr
             return True
         return False
 
-    # Warnings are about the file, not about each run.
+    # Warnings concern the file, not each run.
     with warnings.catch_warnings(action="ignore"):
         return np.array([fails(orbit) for orbit in orbits])

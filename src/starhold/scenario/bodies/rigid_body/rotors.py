@@ -22,8 +22,8 @@ Array: TypeAlias = NDArray[np.float64]
 
 
 class Rotors(NamedTuple):
-    """Wheels, the inertia of their rotors about their own axes (3, 3; kg m2), and the torque that they can always give (N
-    m), with an array (lanes,) in place of each number that differs; None where lanes differ in its allocation."""
+    """Wheels, the inertia (3, 3; kg m2) of their rotors about their spin axes, and the torque (N m) that they can always
+    give, or None where lanes differ in its allocation. Numbers that differ between lanes are arrays (lanes,)."""
 
     wheels: Wheels
     axial: Any
@@ -32,7 +32,7 @@ class Rotors(NamedTuple):
 
 def rotors_over(scenario: Scenario, columns: Mapping[str, Array]) -> Rotors | None:
     """Return the wheels of lanes that differ in the values of some keys, (components..., lanes) by key; None where none of
-    these is a wheel's."""
+    these keys belongs to a wheel."""
     like, table = wheels_of(scenario), scenario.table
     paths = {key: path_of(key, {}, "") for key in columns}
     drawn = {key: path for key, path in paths.items() if path[0] in ("wheels", "wheel")}
@@ -67,7 +67,7 @@ def rotors_over(scenario: Scenario, columns: Mapping[str, Array]) -> Rotors | No
 
 
 def impossible(scenario: Scenario, wheels: Wheels, lanes: int) -> NDArray[np.bool_]:
-    """Return which lanes, (lanes,), have wheels refused by `check_authority`, or friction refused by `check_substeps`."""
+    """Return a mask (lanes,) of the lanes whose wheels `check_authority`, or whose friction `check_substeps`, refuses."""
     viscous, coulomb, inertia = (stacked(column, lanes) for column in (wheels.viscous, wheels.coulomb, wheels.inertia))
     timing = scenario.table.simulation
     least = timing.control_period * ((viscous + coulomb / CREEP) / inertia).max(axis=1) / RESOLVED * (1.0 - 1e-12)
@@ -77,7 +77,7 @@ def impossible(scenario: Scenario, wheels: Wheels, lanes: int) -> NDArray[np.boo
 
 
 def stacked(values: Any, lanes: int) -> Array:
-    """Return numbers, each for all lanes or (lanes,), or tuples of them, as an array (lanes, ...)."""
+    """Return an array (lanes, ...) of nested tuples whose numbers are single, the same for all lanes, or arrays (lanes,)."""
     if isinstance(values, list | tuple):
         return np.stack([stacked(value, lanes) for value in values], axis=1)
     return np.broadcast_to(np.asarray(values, dtype=float), (lanes,))
@@ -99,5 +99,5 @@ def _differ(values: Any) -> bool:
 
 
 def _numbers(array: Array) -> tuple[Any, ...]:
-    """Return the tuples of arrays (lanes,) in an array (lanes, m, n)."""
+    """Return an array (lanes, m, n) as m tuples of n arrays (lanes,)."""
     return tuple(tuple(array[:, i, j] for j in range(array.shape[2])) for i in range(array.shape[1]))

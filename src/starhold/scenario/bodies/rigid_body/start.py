@@ -1,4 +1,4 @@
-"""The start of a run, and its target."""
+"""The initial state of a run and its target."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 def stated(pointing: Pointing) -> Quaternion:
-    """Return the unit quaternion of a table."""
+    """Return the unit quaternion that a table gives as an attitude or as angles."""
     if pointing.angles is not None:
         return from_angles(*pointing.angles)
     return NO_TURN if pointing.attitude is None else unit_of(pointing.attitude)
@@ -44,7 +44,7 @@ def stated(pointing: Pointing) -> Quaternion:
 
 def unit_of(given: Quaternion) -> Quaternion:
     """Return the unit quaternion in the direction of four numbers; an equation."""
-    # Scaled first, so that the squares neither underflow nor overflow.
+    # Scaled first so that squares neither underflow nor overflow.
     return normalise(stretch(1.0 / most(given), given))
 
 
@@ -60,16 +60,16 @@ def target_of(scenario: Scenario) -> Fitted:
 
 
 def _tried(scenario: Scenario, target: Fitted, key: str) -> Fitted:
-    """Return the target itself; InputError for numbers that it refuses, because a start may be relative to it before all
-    parts are checked together."""
+    """Return the target itself. InputError for parameters that it refuses: they are checked here because the initial state
+    may be relative to the target, before all parts are checked together."""
     with input_at(scenario.where, key):
         target.prepared(scenario.table.simulation.control_period)
     return target
 
 
 def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
-    """Return the target of a mode's raw table, in the form of [target] or of a [[part]] of this role; for None the
-    scenario's."""
+    """Return the target that a mode's raw table defines, in the form of [target] or of a [[part]] with the role target; the
+    scenario's target for None."""
     if given is None:
         return target_of(scenario)
     if not isinstance(given, dict):
@@ -87,7 +87,7 @@ def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
 
 
 def _from_table(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
-    """Return the target of a table."""
+    """Return the target that a [target] table defines."""
     simulation = scenario.table.simulation
     if table.mode == "orbital":
         return fit("target", "orbital")
@@ -102,7 +102,7 @@ def _from_table(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
 
 
 def date_of_axes(scenario: Scenario) -> Date | None:
-    """Return the date whose mean equator and equinox define the inertial axes: that of an orbit about the Earth, where the
+    """Return the date whose mean equator and equinox define the inertial axes: the epoch of an orbit about the Earth, if the
     scenario states it or has a part that uses the Sun or the Earth's rotation. None where the axes are arbitrary."""
     orbit = scenario.table.orbit
     if orbit is None or body_of(orbit.gravitational_parameter) != "Earth":
@@ -112,7 +112,7 @@ def date_of_axes(scenario: Scenario) -> Date | None:
 
 
 def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[..., Any]) -> Any:
-    """Return the result of `use` on the times and attitudes in the file of a history. InputError where it cannot be used."""
+    """Return the result of `use` for the times and attitudes of a history file. InputError where the file cannot be used."""
     path = scenario.folder / str(table.file)
     allowed = "a CSV file of columns time,q0,q1,q2,q3 (in another order if named), unit quaternions, times that increase"
     if path.suffix.lower() == ".aem":
@@ -130,8 +130,8 @@ def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[...
 
 
 def start_of(scenario: Scenario, goal: Fitted, attitude: Any = None, rate: Any = None, placed: Any = None) -> State:
-    """Return the initial state of a run with this target; an equation where a unit quaternion or a rate replaces those of
-    [initial], or a position and a velocity those of [orbit]."""
+    """Return the initial state of a run with this target. A unit quaternion and a rate, if given, replace those of
+    [initial], and `placed`, a position and a velocity, those of [orbit]; with them this is an equation."""
     table = scenario.table
     begun = (ZERO, ZERO) if table.orbit is None else table.orbit.start
     position, velocity = begun if placed is None else placed
@@ -149,7 +149,7 @@ def goal_at_start(goal: Fitted, begun: State) -> Goal:
 
 
 def told_to_design(scenario: Scenario, sign: str) -> Start:
-    """Return the start that a design form may use; `sign`: the law's quaternion sign policy."""
+    """Return the initial error that a design form may use; `sign`: the law's quaternion sign policy."""
     table, goal, effectors = scenario.table, target_of(scenario), effectors_of(scenario)
     begun = start_of(scenario, goal)
     aim = goal_at_start(goal, begun)
@@ -207,7 +207,7 @@ def _numbers(cells: list[str], order: list[int], line: int) -> list[float]:
     for place in order:
         number = number_in(cells[place])
         if number is None or not math.isfinite(number):
-            raise ValueError(f"line {line}: {cells[place]!r}, which is no finite number")
+            raise ValueError(f"line {line}: {cells[place]!r}, which is not a finite number")
         row.append(number)
     length = math.hypot(*row[1:])
     if abs(length - 1.0) > OFF_UNIT:

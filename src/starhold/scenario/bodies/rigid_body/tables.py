@@ -34,21 +34,21 @@ class BudgetTable(Table):
         float | None, *quantity(Gain("s", above=0.0, text="errors count until this time; the end of the run if absent"))
     ] = None
     window: Annotated[
-        float | None, *quantity(Gain("s", above=0.0, text="length of windows; a tenth of that time if absent"))
+        float | None, *quantity(Gain("s", above=0.0, text="length of windows; a tenth of the time counted if absent"))
     ] = None
     separation: Annotated[
         float | None,
-        *quantity(Gain("s", above=0.0, text="between the starts of two windows of a drift; half of that time if absent")),
+        *quantity(Gain("s", above=0.0, text="time between a drift's two windows; half of the time counted if absent")),
     ] = None
     confidence: Annotated[
-        float, *quantity(Gain("1", above=0.0, at_most=1.0, text="share of the errors that are no larger, such as 95 %"))
+        float, *quantity(Gain("1", above=0.0, at_most=1.0, text="share of errors within the bound, such as 95 %"))
     ] = 0.9973
     interpretation: Annotated[
         Literal["mixed", "temporal", "ensemble"],
         Field(description="a share of all instants of all runs, of those of the worst run, or of runs at their worst"),
     ] = "mixed"
     runs: Annotated[
-        int, *quantity(Gain("1", at_least=1, at_most=MOST_RUNS, whole=True, text="with random numbers of their own"))
+        int, *quantity(Gain("1", at_least=1, at_most=MOST_RUNS, whole=True, text="runs with different random numbers"))
     ] = 32
     boresight: Annotated[
         Any, *quantity(Gain("1", shape=(3,), spread=False, text="line of sight, body axes; all three axes if absent"))
@@ -85,7 +85,7 @@ def _read_inertia(given: Any) -> Any:
 
 INERTIA = (
     BeforeValidator(_read_inertia),
-    Field(description="three principal moments or a 3x3 matrix, with the wheels (kg m^2)"),
+    Field(description="three principal moments or a 3x3 matrix, including the wheels (kg m^2)"),
     MOMENTS,
 )
 
@@ -94,7 +94,7 @@ class Spacecraft(Table):
     """The body and its actuators."""
 
     inertia: Annotated[Any, *INERTIA]
-    mass: Annotated[float | None, *quantity(Gain("kg", above=0.0, text="for forces that move the orbit"))] = None
+    mass: Annotated[float | None, *quantity(Gain("kg", above=0.0, text="mass, for forces that change the orbit"))] = None
     torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, plain=(1e3, "mN m"), text="largest torque"))] = math.inf
     limit: Annotated[
         Literal["axis", "norm", "none"], Field(description="whether the limit holds for each axis, the norm, or not at all")
@@ -104,7 +104,7 @@ class Spacecraft(Table):
 
 
 class Pointing(Table):
-    """An attitude as a quaternion or as angles."""
+    """An attitude, given as a quaternion or as angles."""
 
     attitude: Annotated[Any, *quantity(QUATERNION)] = None
     angles: Annotated[Any, *quantity(ANGLES)] = None
@@ -128,9 +128,9 @@ class Initial(Pointing):
         Any,
         *quantity(Gain("rad/s", shape=(3,), spread=False, text="angular velocity, body axes")),
     ] = (0.0, 0.0, 0.0)
-    relative_to: Annotated[Literal["inertial", "target"], Field(description="what attitude and rate are relative to")] = (
-        "inertial"
-    )
+    relative_to: Annotated[
+        Literal["inertial", "target"], Field(description="frame to which attitude and rate are relative")
+    ] = "inertial"
 
 
 class TargetTable(Pointing):
@@ -138,7 +138,7 @@ class TargetTable(Pointing):
 
     mode: Annotated[
         Literal["inertial", "orbital", "history"],
-        Field(description="fixed, third axis to the centre of attraction, or as a file gives over time"),
+        Field(description="fixed attitude, third axis to the centre of attraction, or the history in a file"),
     ] = "inertial"
     file: Annotated[
         str | None, Field(description="history beside the scenario: CSV of time (s), q0, q1, q2, q3, or a CCSDS AEM (.aem)")
@@ -172,29 +172,29 @@ class Sensor(Table):
 
 
 class Simulation(SeededTiming):
-    """The duration and the steps."""
+    """The duration of a run and its time steps."""
 
     unit: ClassVar[str] = " s"
     duration: Annotated[float, *quantity(Gain("s", above=0.0, text="length of the run"))]
-    control_period: Annotated[float, *quantity(Gain("s", above=0.0, text="for which a torque is held"))] = 0.1
+    control_period: Annotated[float, *quantity(Gain("s", above=0.0, text="time for which a torque is held"))] = 0.1
 
 
 class Tolerances(Table):
-    """When the target counts as reached."""
+    """The tolerances within which the target counts as reached."""
 
     attitude_tolerance: Annotated[float, *quantity(Gain("rad", above=0.0, text="angle to the target"))] = 2e-3
     rate_tolerance: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="rate relative to the target"))] = 1e-3
 
 
-TURNED = "small turn of its axis about the body axes, which law and allocation do not know"
+TURNED = "small rotation of its axis about the body axes, unknown to law and allocation"
 
 
-VISCOUS = quantity(Gain("N m s", at_least=0.0, plain=(0.1, "uN m s"), text="friction per rad/s"))
-COULOMB = quantity(Gain("N m", at_least=0.0, plain=(0.5, "mN m"), text="friction at any speed"))
+VISCOUS = quantity(Gain("N m s", at_least=0.0, plain=(0.1, "uN m s"), text="viscous friction per rad/s"))
+COULOMB = quantity(Gain("N m", at_least=0.0, plain=(0.5, "mN m"), text="Coulomb friction, at any speed"))
 
 
 class Rotor(Table):
-    """A reaction wheel as a unit of the catalogue, or as its numbers; numbers given override the unit's."""
+    """A reaction wheel, given as a unit of the catalogue or by its parameters, which override those of the unit."""
 
     unit: Annotated[str | None, Field(description="a unit of the catalogue, see `starhold wheels`")] = None
     inertia: Annotated[
@@ -208,23 +208,23 @@ class Rotor(Table):
     ] = None
     viscous: Annotated[float | None, *VISCOUS] = None
     coulomb: Annotated[float | None, *COULOMB] = None
-    momentum: Annotated[float, *quantity(Gain("N m s", text="at the start"))] = 0.0
+    momentum: Annotated[float, *quantity(Gain("N m s", text="angular momentum at the start"))] = 0.0
     top_speed: Annotated[
         float | None,
         *quantity(Gain("rad/s", above=0.0, plain=(2e3, "rpm"), text='in place of momentum_limit, such as "6000 rpm"')),
     ] = None
     speed: Annotated[
-        float | None, *quantity(Gain("rad/s", plain=(2e3, "rpm"), text="at the start in place of momentum, body at rest"))
+        float | None, *quantity(Gain("rad/s", plain=(2e3, "rpm"), text="in place of momentum, for a body at rest"))
     ] = None
     static_friction: Annotated[
-        float | None, *quantity(Gain("N m", at_least=0.0, plain=(0.5, "mN m"), text="largest, of a slow rotor"))
+        float | None, *quantity(Gain("N m", at_least=0.0, plain=(0.5, "mN m"), text="largest friction, at low speed"))
     ] = None
     stribeck_speed: Annotated[
         float | None,
-        *quantity(Gain("rad/s", above=0.0, plain=(2e3, "rpm"), text="at which friction is largest, the static one")),
+        *quantity(Gain("rad/s", above=0.0, plain=(2e3, "rpm"), text="speed at which friction has its largest value")),
     ] = None
     power_limit: Annotated[
-        float | None, *quantity(Gain("W", above=0.0, text="of the motor as it drives the rotor: torque times speed"))
+        float | None, *quantity(Gain("W", above=0.0, text="largest power that drives the rotor: torque times speed"))
     ] = None
     static_imbalance: Annotated[
         float | None, *quantity(Gain("kg m", at_least=0.0, text="mass of the rotor times its distance from the axis"))
@@ -238,7 +238,7 @@ class Rotor(Table):
     position: Annotated[
         Any,
         *quantity(
-            Gain("m", shape=(3,), spread=False, plain=(100.0, "mm"), text="from the centre of mass, for a static imbalance")
+            Gain("m", shape=(3,), spread=False, plain=(100.0, "mm"), text="position from the centre of mass, for imbalance")
         ),
     ] = None
     mounting_error: Annotated[Any, *quantity(replace(MOUNTING, text=TURNED))] = None
@@ -258,13 +258,13 @@ class WheelTable(Rotor):
 
 
 class WheelsTable(Rotor):
-    """All reaction wheels: what they share, and their layout unless [[wheel]] tables give the axes."""
+    """The parameters that all reaction wheels share, and their layout unless [[wheel]] tables give the axes."""
 
     layout: Annotated[
         Literal["orthogonal", "pyramid", "nasa-standard"] | None, Field(description="three or four wheels of one kind")
     ] = None
     allocation: Annotated[
-        Literal["least-squares", "least-peak"], Field(description="how a torque is allocated among more than three")
+        Literal["least-squares", "least-peak"], Field(description="how a torque is allocated among more than three wheels")
     ] = "least-squares"
 
 
@@ -272,25 +272,25 @@ Action: TypeAlias = Literal["none", "reallocate", "retune", "both"]
 
 
 class FaultTable(Table):
-    """A fault of a wheel, of the body or of both during the run, and what is done about it."""
+    """A fault of a wheel, of the body or of both during the run, and the reaction to it."""
 
-    time: Annotated[float, *quantity(Gain("s", at_least=0.0, text="when it happens"))]
-    wheel: Annotated[int | None, *quantity(Gain("1", at_least=1, whole=True, text="which wheel, counted from 1"))] = None
+    time: Annotated[float, *quantity(Gain("s", at_least=0.0, text="time of the fault"))]
+    wheel: Annotated[int | None, *quantity(Gain("1", at_least=1, whole=True, text="number of the wheel, from 1"))] = None
     lost: Annotated[Flag, Field(description="the motor gives no more torque")] = False
-    torque_limit: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="what the motor still gives"))] = None
-    momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="what the wheel still stores"))] = None
+    torque_limit: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="largest torque from then on"))] = None
+    momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="largest momentum from then on"))] = None
     viscous: Annotated[float | None, *VISCOUS] = None
     coulomb: Annotated[float | None, *COULOMB] = None
     inertia: Annotated[Any, *INERTIA] = None
-    delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="until it is diagnosed and acted on"))] = 0.0
+    delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="time until the fault is diagnosed and acted on"))] = 0.0
     action: Annotated[
         Action, Field(description="torque reallocated to the other wheels, gains redesigned for the torque left, or both")
     ] = "both"
-    """Unless it is "none", the law knows the new inertia from the diagnosis on."""
+    """Unless the action is "none", the law knows the new inertia from the diagnosis on."""
 
     @property
     def strikes_wheel(self) -> bool:
-        """Whether a wheel changes."""
+        """Whether the fault changes a wheel."""
         changed = (self.torque_limit, self.momentum_limit, self.viscous, self.coulomb)
         return self.lost or any(value is not None for value in changed)
 
@@ -315,9 +315,9 @@ class CertifyTable(Table):
         float | None, *quantity(Gain("rad", above=0.0, at_most=math.pi, text="slews from rest within the torque limit"))
     ] = None
     inertia_tolerance: Annotated[
-        float | None, *quantity(Gain("1", above=0.0, at_most=1.0, text="error of J_ij as a share of sqrt(J_ii J_jj)"))
+        float | None, *quantity(Gain("1", above=0.0, at_most=1.0, text="bound on errors of J_ij / sqrt(J_ii J_jj)"))
     ] = None
-    disturbance: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="norm of an unmodelled torque"))] = 0.0
+    disturbance: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="largest norm of unmodelled torque"))] = 0.0
     momentum: Annotated[
         float | None,
         *quantity(
@@ -330,14 +330,14 @@ class AttitudeLawTable(LawTable):
     """The keys of every law table besides the law's own gains."""
 
     quaternion_sign: Annotated[
-        Literal["as_published", "shortest", "hysteresis"], Field(description="which of q and -q is fed back")
+        Literal["as_published", "shortest", "hysteresis"], Field(description="choice between q and -q for the law")
     ] = "as_published"
     hysteresis_width: Annotated[float, *quantity(Gain("1", above=0.0, at_most=0.999, text="flips when h q0 < -width"))] = 0.5
-    fault_action: Annotated[Action | None, Field(description="reaction to faults, in place of their own")] = None
+    fault_action: Annotated[Action | None, Field(description="reaction to faults, in place of each fault's action")] = None
 
 
 class RigidBodyTable(ScenarioTable):
-    """A whole file, but for its law tables, which are read law by law."""
+    """A scenario file without its law tables, which are read one by one."""
 
     spacecraft: Spacecraft
     orbit: Orbit | None = None

@@ -1,4 +1,4 @@
-"""The table of a slew's limits, and of the search for the root that slews fastest within them."""
+"""The [transient] table: the limits of a slew, and the search for the closed-loop root that slews fastest within them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from starhold.scenario.quantity import quantity, reader
 from starhold.scenario.tables import Table, at_key, refuse
 
 MOST = 100_000
-"""The most values of a list."""
+"""The largest number of values in a list."""
 ANGLE = Gain("rad", above=0.0, at_most=math.pi, text="initial angles of the search")
-ROOT = Gain("1/s", text="roots that are tried")
+ROOT = Gain("1/s", text="closed-loop roots to try")
 RATE = Gain("rad/s", text="relative to the target at the start of the search: along the axis, or a vector in body axes")
 
 
@@ -28,7 +28,7 @@ def _spread(first: float, last: float, step: float) -> list[float]:
 
 
 def _values(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
-    """Increasing quantities, as a list or as { from, to, step }."""
+    """Return the annotations for increasing quantities, given as a list or as { from, to, step }."""
     allowed = "a list of values that increase, or { from = .., to = .., step = .. }"
     read, size = reader(gain), reader(Gain(gain.unit, above=0.0))
 
@@ -67,11 +67,11 @@ def _number_or_vector(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
 
 
 class TransientTable(Table):
-    """Limits of a slew, when it is over, and the range of the search of `starhold modal-roots` for the fastest."""
+    """Limits of a slew, its end conditions, and the range in which `starhold modal-roots` searches for the fastest."""
 
-    rate_limit: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="of the norm of the body's rate"))] = math.inf
+    rate_limit: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="limit on the norm of the body's rate"))] = math.inf
     acceleration_limit: Annotated[
-        float, *quantity(Gain("rad/s^2", above=0.0, text="of each component of its derivative"))
+        float, *quantity(Gain("rad/s^2", above=0.0, text="limit on each component of the rate's derivative"))
     ] = math.inf
     rate_tolerance: Annotated[
         float, *quantity(Gain("rad/s", at_least=0.0, text="by which the search also tries to exceed the limit"))
@@ -80,11 +80,11 @@ class TransientTable(Table):
         float, *quantity(Gain("rad/s^2", at_least=0.0, text="by which the search also tries to exceed the limit"))
     ] = 0.0
     angle_end: Annotated[
-        float, *quantity(Gain("rad", above=0.0, at_most=math.pi, text="the transient is over once the angle stays within"))
+        float, *quantity(Gain("rad", above=0.0, at_most=math.pi, text="the transient ends once the angle stays below"))
     ] = math.radians(0.1)
-    rate_end: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="and the rate relative to the target within"))] = (
-        math.radians(0.1)
-    )
+    rate_end: Annotated[
+        float, *quantity(Gain("rad/s", above=0.0, text="and the rate relative to the target stays below"))
+    ] = math.radians(0.1)
     axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="axis of the slews, body axes"))] = (
         1.0,
         1.0,
