@@ -249,10 +249,8 @@ def _sampling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     text = f"the linear loop is stable with the torque held for {n['period']:.12g} s"
     if n["longest"] is None:
         return text
-    longest = shown(n["longest"], " s")
-    if n["every_shorter"]:
-        return f"{text} and for every period up to {longest}"
-    return f"{text} and for {longest} (periods between these are not shown)"
+    periods = "every period up to {}" if n["every_shorter"] else "{} (periods between these are not shown)"
+    return f"{text} and for {periods.format(shown(n['longest'], ' s'))}"
 
 
 def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
