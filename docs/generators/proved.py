@@ -37,16 +37,21 @@ LANES, FEWER, LASTING, ROUNDS, DIRECTIONS = 2500, 250, 1000, 4, 24
 MISSING = "—"
 
 
-def flown(name: str, law: str) -> dict[str, dict[str, Any]]:
-    """What is proved now of all certificates of a law, as it starts, after faults and of modes, and the worst flights."""
-    scenario, rows = sh.load(name), dict[str, dict[str, Any]]()
+def claims(name: str, law: str) -> dict[str, tuple[Claim, int]]:
+    """What is proved now of all certificates of a law, as it starts, after faults and of modes, with the number of parts."""
+    scenario, rows = sh.load(name), dict[str, tuple[Claim, int]]()
     for one in STUDY.certify(scenario, entry := scenario.pick(law), build(scenario, entry), pointing=True):
         for kind in ("appendages", "pointing"):
             claim = one.certificate.claim(kind)
             if claim is not None and claim.outcome == "proved":
                 more = " with appendages" if kind == "appendages" else ""
-                rows[f"{name} {one.certificate.name}{more}"] = told(claim, one.certificate.subject["parts"]) | worst(claim)
+                rows[f"{name} {one.certificate.name}{more}"] = claim, one.certificate.subject["parts"]
     return rows
+
+
+def flown(name: str, law: str) -> dict[str, dict[str, Any]]:
+    """The numbers of all these claims, and the worst flights."""
+    return {key: told(claim, parts) | worst(claim) for key, (claim, parts) in claims(name, law).items()}
 
 
 def told(claim: Claim, parts: int) -> dict[str, Any]:
