@@ -171,3 +171,13 @@ def library(name: str) -> Any:
     """Return a reader's module, loaded when its first number is met; named at run time because its types are too loose
     for a strict checker."""
     return import_module(name)
+
+
+class UnreadableError(TypeError):
+    """A reader that proves cannot follow an equation; the text names the operation and the line."""
+
+
+def unreadable(what: str) -> UnreadableError:
+    """Return the error that names an operation and where it is written."""
+    place, text = written_at()
+    return UnreadableError(f"{place}: {what}, in `{text}`")

@@ -16,22 +16,12 @@ from typing import Any, ClassVar, TypeAlias
 
 from flint import arb, fmpq
 
-from starhold.algebra.operations import written_at
+from starhold.algebra.operations import unreadable
 
 Coefficient: TypeAlias = Any
 """A rational (`fmpq`), or a ball (`arb`) where a coefficient is known to lie in it."""
 Monomial: TypeAlias = tuple[str, ...]
 """Variables in alphabetic order, one repeated as often as its power says; () is the constant."""
-
-
-class UnreadableError(TypeError):
-    """A polynomial cannot follow an equation; the text names the operation and the line."""
-
-
-def unreadable(what: str) -> UnreadableError:
-    """Return the error that names an operation and where it is written."""
-    place, text = written_at()
-    return UnreadableError(f"{place}: {what}, in `{text}`")
 
 
 def exact(number: Any) -> Coefficient:

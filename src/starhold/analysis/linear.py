@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from starhold.algebra.dual import Dual, differentiate, variables
+from starhold.algebra.exponential import exponential
 from starhold.algebra.quaternion import NO_TURN, relative, to_body
 from starhold.algebra.structure import buffers, flatten, mapped
 from starhold.algebra.vector import ZERO
@@ -315,7 +315,7 @@ def sampled(plant: System, period: float, delay: float = 0.0) -> System:
     # Until `rest` the previous command acts, then the new one.
     late, new = _under_hold(plant, period - rest)[1][:, command], np.zeros((size, 3))
     if split:
-        to_end = expm(plant.A * (period - rest))
+        to_end = exponential(plant.A * (period - rest))
         new, late = late, to_end @ _under_hold(plant, rest)[1][:, command]
     waiting = whole + split
     names = tuple(f"{name}_{-k}_steps" for k in range(-waiting, 0) for name in COMMAND)
@@ -342,8 +342,8 @@ def _under_hold(plant: System, time: float) -> tuple[Array, Array]:
     size, inputs = plant.B.shape
     whole = np.zeros((size + inputs, size + inputs))
     whole[:size] = np.hstack([plant.A, plant.B])
-    exponential: Any = expm(whole * time)
-    return exponential[:size, :size], exponential[:size, size:]
+    moved = exponential(whole * time)
+    return moved[:size, :size], moved[:size, size:]
 
 
 def in_series(plant: System, law: System) -> System:

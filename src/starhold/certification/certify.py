@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from starhold.algebra.polynomial import Polynomial, UnreadableError, constants, reciprocal
+from starhold.algebra.operations import UnreadableError
+from starhold.algebra.polynomial import Polynomial, constants, reciprocal
 from starhold.algebra.vector import dot
 from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, VALID_ESTIMATE, WHEELS
 from starhold.certification.certificate import EXACT, NOT_SOUGHT, Certificate, Claim, Obligation

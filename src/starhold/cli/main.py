@@ -8,8 +8,9 @@ import signal
 import sys
 import traceback
 import warnings
+from collections.abc import Mapping
 from types import ModuleType
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -18,21 +19,24 @@ from starhold.cli.arguments import INTERNAL_ERROR, USER_ERROR
 from starhold.cli.process import Outlet, on_signal, open_outlets
 from starhold.errors import InputError, InterruptedByUserError
 
-app = typer.Typer(
-    help="Design, certify, fly and compare control laws for spacecraft.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
 
-for name, command in commands.every().items():
-    if isinstance(command, typer.Typer):
-        app.add_typer(command, name=name)
-    else:
-        app.command(name)(command)
+def make_app(every: Mapping[str, Any]) -> typer.Typer:
+    """Make the application with these commands."""
+    made = typer.Typer(
+        help="Design, certify, fly and compare control laws for spacecraft.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    for name, command in every.items():
+        if isinstance(command, typer.Typer):
+            made.add_typer(command, name=name)
+        else:
+            made.command(name)(command)
+    made.callback(invoke_without_command=True)(_root)
+    return made
 
 
-@app.callback(invoke_without_command=True)
 def _root(version: Annotated[bool, typer.Option("--version", help="print the version and exit")] = False) -> None:
     if version:
         typer.echo(_version())
@@ -43,6 +47,10 @@ def _version() -> str:
     from starhold.version import __version__
 
     return f"starhold {__version__}"
+
+
+COMMANDS = commands.every()
+app = make_app(COMMANDS)
 
 
 def main() -> None:
@@ -78,8 +86,10 @@ def run_command() -> int:
         # A shell waits for names and needs no values, so the library that converts them is not loaded: completion takes a
         # value that cannot be converted for absent.
         sys.modules["pydantic"] = cast(ModuleType, None)
+    chosen = {name: command for name, command in COMMANDS.items() if name in sys.argv[1:2]}
     try:
-        app(standalone_mode=True)
+        # Options of other commands than the one that is asked for take long to make.
+        (make_app(chosen) if chosen else app)(standalone_mode=True)
     except SystemExit as ending:
         return ending.code if isinstance(ending.code, int) else int(ending.code is not None)
     except InputError as error:

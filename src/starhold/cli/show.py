@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
-from rich.progress import TaskID, TimeRemainingColumn
 from rich.table import Table
 
 from starhold.cli.console import WIDE, bars_with, console
@@ -27,16 +26,15 @@ COLUMN = 9
 
 @contextmanager
 def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, int, int], None]]:
-    """Show progress bars, one for each law; yield the function that the simulation calls."""
+    """Show progress bars on a terminal, one for each law; yield the function that the simulation calls."""
+    if not console.is_terminal:
+        yield lambda name, done, total: None
+        return
+    from rich.progress import TimeRemainingColumn
+
     with bars_with("steps", TimeRemainingColumn()) as bars:
-        tasks: dict[str, TaskID] = {}
-
-        def notice(name: str, done: int, total: int) -> None:
-            bars.update(tasks[name], completed=done, total=total, description=name)
-
-        for entry in entries:
-            tasks[entry.name] = bars.add_task(f"{entry.name} (compiling)", total=steps)
-        yield notice
+        tasks = {entry.name: bars.add_task(f"{entry.name} (compiling)", total=steps) for entry in entries}
+        yield lambda name, done, total: bars.update(tasks[name], completed=done, total=total, description=name)
 
 
 def print_outcome(flights: Sequence[Flight]) -> None:

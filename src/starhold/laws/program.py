@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from starhold.algebra.polynomial import UnreadableError
+from starhold.algebra.operations import UnreadableError
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError

@@ -1,7 +1,7 @@
 """Turns the checks of a scenario's numbers into programs of the keys that a page moves: the checks of the craft and the
 start, and each law's own `check` and `remember`, with the texts of their refusals."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from functools import reduce
 from itertools import product
 from typing import Any, NamedTuple
@@ -103,13 +103,14 @@ class Asked(NamedTuple):
     ranged: dict[str, float]
 
 
-def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str, Any]) -> Asked:
-    """Return the checks of these keys by a scenario whose laws have these loops."""
+def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str, Any], flown: Container[str]) -> Asked:
+    """Return the checks of these keys by a scenario whose laws have these loops, and of which those named fly."""
     shared = {key: value for key, value in dials.items() if not key.startswith("law.")}
     questions, unasked = _recorded("", lambda values: scenario.hooks.admitted(scenario, values), shared)
     fixed, ranged = dict.fromkeys(unasked, UNASKED), dict[str, float]()
     # First the checks of all laws as a file is read, then those as loops are built.
-    for entry, reads in [(entry, reads) for reads in (True, False) for entry in scenario.laws]:
+    built = [entry for entry in scenario.laws if entry.name in flown]
+    for entry, reads in [*((entry, True) for entry in scenario.laws), *((entry, False) for entry in built)]:
         check, prefix = _check(scenario, entry, loops[entry.name], reads), f"law.{entry.name}."
         gains = {key: value for key, value in dials.items() if key.startswith(prefix) and "." not in key[len(prefix) :]}
         more, unasked = _recorded(entry.name, check, shared | gains)

@@ -104,8 +104,8 @@ class Piece(NamedTuple):
 
 
 def reflight(scenario: Scenario, laws: Collection[str] | None = None) -> Reflight:
-    """Make the programs that fly the laws of these names again, or all laws; the scenario is read and checked with all of
-    them. Designed gains stay as they are: the scenario has them as numbers."""
+    """Make the programs that fly the laws of these names again, or all laws; the scenario is read with all of them. Designed
+    gains stay as they are: the scenario has them as numbers."""
     explicit = _explicit(scenario)
     dials = dict(explicit.hooks.dials(explicit))
     shared = list(dials)
@@ -123,11 +123,13 @@ def reflight(scenario: Scenario, laws: Collection[str] | None = None) -> Refligh
     explicit = changed(explicit, _changes(explicit, {key: dials[key] for key in shared if key == "initial.attitude"}))
     tried = _Tried(explicit, dials)
     reflown: list[Reflown] = []
-    loops = {entry.name: build(explicit, entry) for entry in explicit.laws}
-    checks = ask(explicit, loops, dials)
+    flown = {entry.name for entry in explicit.laws if laws is None or entry.name in laws}
+    makers = {entry.name: build if entry.name in flown else explicit.hooks.build for entry in explicit.laws}
+    loops = {entry.name: makers[entry.name](explicit, entry) for entry in explicit.laws}
+    checks = ask(explicit, loops, dials, flown)
     for entry in explicit.laws:
         loop = loops[entry.name]
-        if entry.name in grounded or not (laws is None or entry.name in laws):
+        if entry.name in grounded or entry.name not in flown:
             continue
         if loop.events:
             grounded[entry.name] = FAULTS

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from starhold.algebra.circular import SHIFT
-from starhold.algebra.operations import WORD, Operation
-from starhold.algebra.polynomial import unreadable
+from starhold.algebra.operations import WORD, Operation, unreadable
 from starhold.algebra.structure import leaves
 from starhold.errors import InputError
 from starhold.kernel.numbers import rational

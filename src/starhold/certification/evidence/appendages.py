@@ -6,13 +6,13 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
-from importlib import import_module
 from math import cos, isfinite, radians
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.exponential import exponential
 from starhold.algebra.polynomial import exact
 from starhold.certification.appendages import appendages
 from starhold.certification.evidence.attitude import Loop
@@ -29,7 +29,6 @@ from starhold.kernel.theorems.appendages import FOLLOWED, inner, sized
 
 APPENDED = "points with appendages"
 Array = NDArray[np.float64]
-linalg: Any = import_module("scipy.linalg")
 TURNS = (12.0, 8.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.2, 1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.05, 0.02, 0.01)
 """Turns (deg) at which starts are tried."""
 SWUNG = 0.1
@@ -217,7 +216,7 @@ def modes_of(motion: Appended) -> tuple[Array, list[int]]:
     """Return modal coordinates of the linear motion from sample to sample, short ones, and the sizes of their blocks."""
     A, B, K = map(floats, (motion.A, motion.B, motion.K))
     n, h = motion.n, float(motion.h)
-    moved = linalg.expm(np.block([[A, B], [np.zeros((3, n + 3))]]) * h)
+    moved = exponential(np.block([[A, B], [np.zeros((3, n + 3))]]) * h)
     values, vectors = np.linalg.eig(moved[:n, :n] - moved[:n, n:] @ K)
     if not np.abs(values).max() < 1.0:
         raise RefusedError("the linear loop with its appendages is not stable")

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from starhold.certification.evidence.cones import once
 from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.recorded import RecordedLoop, curvature, sign_words
-from starhold.certification.evidence.squares import combined, largest_number, once, posed, solved, squares
+from starhold.certification.evidence.squares import combined, largest_number, posed, solved, squares
 from starhold.kernel.loops import HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly

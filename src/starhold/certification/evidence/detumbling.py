@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.polynomial import UnreadableError
+from starhold.algebra.operations import UnreadableError
 from starhold.certification.evidence.finding import NotFoundError, complete, read
 from starhold.certification.evidence.recorded import RecordedLoop
 from starhold.certification.evidence.squares import rounded

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.certification.evidence.cones import interior_point
 from starhold.certification.evidence.sparse import entries_of
-from starhold.certification.evidence.squares import interior_point
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
 from starhold.kernel.numbers import Rows, norm

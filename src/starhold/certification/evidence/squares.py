@@ -1,32 +1,28 @@
-"""Guesses of sums of squares: multipliers, cofactors and a Gram matrix by an interior point (Clarabel), then made exact.
+"""Guesses of sums of squares: multipliers, cofactors and a Gram matrix by an interior point, then made exact.
 
 All of them are linear in the polynomial. In floats the matrix is made as definite as can be, in units in which the variables
 are about one; after rounding to short numbers, the residual is added to the matrix, monomial by monomial.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
-from importlib import import_module
 from itertools import combinations_with_replacement
 from math import ldexp
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from flint import fmpq_mat
 
 from starhold.algebra.polynomial import exact
+from starhold.certification.evidence.cones import interior_point, once
 from starhold.certification.evidence.sparse import Entries
 from starhold.certification.matrices import fraction
 from starhold.kernel.numbers import RefusedError, times, transpose
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
 
-T = TypeVar("T")
-TOLERANCE = 1e-11
-LIMIT = 30.0
-"""The time limit of the interior point (s)."""
 LARGE = 3000
 """The entries of a matrix beyond which the sparse interior point takes too long."""
 DIGITS = (12, 14, 9, 16)
@@ -191,39 +187,6 @@ def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly
     for m, c in problem.p.terms.items():
         b[rows[m]] = float(c) * size(m)
     return A, b, largest
-
-
-_KNOWN: dict[Any, Any] = {}
-MOST_KNOWN = 256
-
-
-def once(key: Any, make: Callable[[], T]) -> T:
-    """Return the result of `make` for this key, which contains all that it depends on. Modes of a law often do not differ in
-    what is proved, and limits of axes only in their signs: results are kept for the next. The kernel checks them each time.
-    """
-    if key not in _KNOWN:
-        if len(_KNOWN) >= MOST_KNOWN:
-            _KNOWN.clear()
-        _KNOWN[key] = make()
-    return _KNOWN[key]
-
-
-def interior_point(cost: Any, A: Entries, b: Any, equal: int, signed: int, sides: Sequence[int]) -> Any | None:
-    """Minimise cost.x with A x + s = b, s in the cones; None where that fails."""
-    # Loaded here, because not every command certifies.
-    clarabel: Any = import_module("clarabel")
-    cones = [clarabel.ZeroConeT(equal), clarabel.NonnegativeConeT(signed), *map(clarabel.PSDTriangleConeT, sides)]
-    settings = clarabel.DefaultSettings()
-    settings.verbose, settings.time_limit = False, LIMIT
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    matrix, none = A.compressed(), Entries([], [], [], (len(cost), len(cost))).compressed()
-
-    def solve() -> Any | None:
-        solution = clarabel.DefaultSolver(none, cost, matrix, b, cones, settings).solve()
-        return np.array(solution.x) if "Solved" in str(solution.status) or "Insufficient" in str(solution.status) else None
-
-    numbers = cost.tobytes(), matrix.key(), b.tobytes()
-    return once((numbers, equal, signed, *sides), solve)
 
 
 def optimum(

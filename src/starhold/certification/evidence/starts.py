@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from starhold.certification.assumptions import as_it_starts
 from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.cones import interior_point
 from starhold.certification.evidence.finding import NotFoundError, evidence, read
 from starhold.certification.evidence.sparse import entries_of
-from starhold.certification.evidence.squares import DEFINITE, cofactors, equations, free, interior_point, posed, settled
+from starhold.certification.evidence.squares import DEFINITE, cofactors, equations, free, posed, settled
 from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held

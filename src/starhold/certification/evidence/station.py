@@ -7,7 +7,7 @@ from functools import cached_property
 from math import inf, isqrt, nextafter, sqrt
 from typing import Any
 
-from starhold.algebra.polynomial import UnreadableError
+from starhold.algebra.operations import UnreadableError
 from starhold.certification.evidence.attitude import highest
 from starhold.certification.evidence.finding import (
     NotFoundError,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.exponential import exponential
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.vector import Vector, add, skew
 from starhold.laws.interface import Measurement, tracking_torque
@@ -71,8 +71,8 @@ def motion(inertia: Array, rate: Array, period: float) -> tuple[Array, Array]:
     spun = np.array(skew(tuple(inertia @ rate))) - turn @ inertia  # pyright: ignore
     rates = np.zeros((9, 9))
     rates[:3, :3], rates[:3, 6:], rates[3:6, :3], rates[3:6, 3:6] = inverse @ spun, inverse, 0.5 * np.eye(3), -turn
-    exponential: Any = import_module("scipy.linalg").expm(rates * period)
-    return exponential[:6, :6], exponential[:6, 6:]
+    moved = exponential(rates * period)
+    return moved[:6, :6], moved[:6, 6:]
 
 
 def first_move(measurement: Measurement, move: Array, craft: Craft) -> Vector:
