@@ -141,12 +141,12 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         )
 
 
-def _late(numbers: Mapping[str, Fraction], told: Mapping[str, Late]) -> Iterator[str]:
+def _late(numbers: Mapping[str, Fraction], lates_told: Mapping[str, Late]) -> Iterator[str]:
     for kind in {name.split(".")[1] for name in numbers if name.startswith("late.")}:
-        if kind not in told:
+        if kind not in lates_told:
             yield f"its {kind} is not late"
             continue
-        late, claimed = told[kind], {name: numbers.get(f"late.{kind}.{name}") for name in ("kept", "mean", "most")}
+        late, claimed = lates_told[kind], {name: numbers.get(f"late.{kind}.{name}") for name in ("kept", "mean", "most")}
         exact = {name: numbers.get(f"late.{kind}.{name}.least") for name in ("kept", "mean")}
         for name in ("kept", "mean"):
             x, least = getattr(late, name), exact[name]

@@ -1,4 +1,4 @@
-"""What comes late in a loop: the torque that the law asks for, and the attitude and the rate that it is told.
+"""A loop in which something comes late: the torque that the law asks for, or the attitude or the rate that it is told.
 Docs/kernel.md, section 10."""
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Late:
         """By how much of |e| the torque is off at any time."""
         return max(Fraction(1), self.mean)
 
-    def told(self, unit: str) -> str:
+    def in_words(self, unit: str) -> str:
         """Return how late it is, in words."""
         share = f"{below(self.mean)} times that in the mean"
         return f"off by up to {below(self.begun)} {unit} at first, {share} and {below(self.kept)} times that after a period"
@@ -101,7 +101,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Steady:
-    """Of a torque that is late e = f - Sx: f becomes kept f + |Mx| and what else changes, of which what is not linear in w
+    """A torque that is late by e = f - Sx: f becomes kept f + |Mx| and what else changes, of which what is not linear in w
     and q counts `off` times."""
 
     S: Rows
@@ -111,9 +111,9 @@ class Steady:
 
 
 class Costs(NamedTuple):
-    """What a torque that is late does to V in a period, for each unit: of its mean, of that which moves the rates, and of
-    the product of both; works: `more` times its mean |Fx|, with F for how far its mean moves the rates, by `far` for each
-    unit of what moves them."""
+    """The costs of a torque that is late: what it does to V in a period, for each unit of its mean, of that which moves the
+    rates, and of the product of both; works: `more` times its mean |Fx|, with F for how far its mean moves the rates, by
+    `far` for each unit of what moves them."""
 
     mean: Fraction
     moved: Fraction
@@ -139,26 +139,26 @@ class Follower(Reader):
     def follow(self, numbers: Numbers) -> list[Late]:
         """Read what comes late."""
         names = ("kept", "mean", "weight", "begun", "rest")
-        found = [
+        lates = [
             Late(kind, *(numbers[f"late.{kind}.{name}"] for name in names))
             for kind in KINDS
             if f"late.{kind}.mean" in numbers
         ]
-        demand(all(one.kept < 1 and one.weight > 0 for one in found), "what is late never comes")
+        demand(all(one.kept < 1 and one.weight > 0 for one in lates), "what is late never comes")
         self.step = plus(self.near.A, scalar(1, 6), -1)
-        self.asked = times(self.near.torque, self.step)
-        least = [numbers.get(f"late.torque.{name}.least") for name in ("kept", "mean")] if found else []
+        self.demanded = times(self.near.torque, self.step)
+        least = [numbers.get(f"late.torque.{name}.least") for name in ("kept", "mean")] if lates else []
         self.steady: Steady | None = None
         if least and least[0] is not None and least[1] is not None:
-            late = found[0]
+            late = lates[0]
             demand(least[0] <= late.kept and least[1] <= late.mean, "a torque is late otherwise than it is")
             self.near, self.steady = steadied(self.near, self.h, late.kept, late.mean)
             self.inexact = late.kept - least[0], late.mean - least[1]
         # What the law's torque has beside that near its target.
-        spun = [with_momentum(p - g) for p, g in zip(self.pull, self.bend, strict=True)] if found else []
-        self.gyrating = spun, minus(self.speeding, spun) if found else []
-        self.beyond: list[Poly] = minus(self.loop.u, apply(self.near.torque, [var(name) for name in STATE])) if found else []
-        return found
+        spun = [with_momentum(p - g) for p, g in zip(self.pull, self.bend, strict=True)] if lates else []
+        self.gyrating = spun, minus(self.speeding, spun) if lates else []
+        self.beyond: list[Poly] = minus(self.loop.u, apply(self.near.torque, [var(name) for name in STATE])) if lates else []
+        return lates
 
     def steady_part(self, tube: Tube) -> Fraction:
         """Return how large the part of e is at most that is linear in the state."""
@@ -169,22 +169,22 @@ class Follower(Reader):
         sizes = ((late.sizes, (root(up(c / late.weight)), late.rest)) for late in self.lates)
         return {name: x for names, values in sizes for name, x in zip(names, values, strict=True)}
 
-    def share(self, late: Late, told: Sizes) -> Fraction:
+    def share(self, late: Late, known: Sizes) -> Fraction:
         """Return by how much the torque is off for each unit of what is late, of a law that is told what has these sizes."""
         u, r, a = self.loop.u, self.size("r"), self.size("a")
         if late.kind == "torque":
             return Fraction(1)
         if late.kind == "rate":
-            return felt(u, "w", told) + felt(u, "h", told) * stretch(self.loop.given)
-        turned = (felt(u, "w", told) + felt(u, "r", told)) * r + felt(u, "a", told) * a
-        turned += felt(u, "e", told) * self.change[1] if self.change else ZERO
-        return felt(u, "q", told) + 2 * turned
+            return felt(u, "w", known) + felt(u, "h", known) * stretch(self.loop.given)
+        turned = (felt(u, "w", known) + felt(u, "r", known)) * r + felt(u, "a", known) * a
+        turned += felt(u, "e", known) * self.change[1] if self.change else ZERO
+        return felt(u, "q", known) + 2 * turned
 
     def behind(self, sizes: Sizes, kinds: tuple[str, ...] = KINDS, rest: bool = False) -> Behind:
         """Return by how much the torque is off at most, by all that is late, or by the b of it."""
-        told, sums = as_told(self.lately(sizes), self.wrong), [ZERO] * 3
+        known, sums = as_told(self.lately(sizes), self.wrong), [ZERO] * 3
         for one in self.lates:
-            size = self.share(one, told) * sum(sizes[x] for x in one.sizes[rest:]) * (one.kind in kinds)
+            size = self.share(one, known) * sum(sizes[x] for x in one.sizes[rest:]) * (one.kind in kinds)
             sums = [x + y * size for x, y in zip(sums, (one.most, one.mean, one.moved), strict=True)]
         return Behind(*sums)
 
@@ -194,7 +194,7 @@ class Follower(Reader):
         if not self.lates:
             return []
         sizes, h, u, least = tube.sizes, self.h, self.loop.u, tube.region.least
-        near, told = tube.region.sizes | {"v": 1 - least}, as_told(self.lately(sizes), self.wrong)
+        near, known = tube.region.sizes | {"v": 1 - least}, as_told(self.lately(sizes), self.wrong)
         (wide, turn), (bent, curved) = (
             (stretch([row[part] for row in self.near.torque]) for part in (RATE, TURN)),
             (felt(self.beyond, letter, sizes) for letter in "wq"),
@@ -213,11 +213,16 @@ class Follower(Reader):
         aside = h / 2 * sizes[SPEED] * root(2 * (1 - least + tube.turned))
         pushed, error = self.pushed(sizes), self.misread(tube.region)[0]
         beside_law = 2 * (error + pushed["both"] - pushed["outside"] + self.stale(sizes, u))
-        ahead, found = h * self.light, list[Change]()
+        ahead, lates = h * self.light, list[Change]()
         for late in self.lates:
             # How much it changes with how far rates and turn are from where they go linearly, and with where they go.
             off, by, turned, rows = {
-                "torque": (wide + (turn + curved) * h / 2, bent, turn + curved, [(Fraction(1), self.asked), (curved, Aq)]),
+                "torque": (
+                    wide + (turn + curved) * h / 2,
+                    bent,
+                    turn + curved,
+                    [(Fraction(1), self.demanded), (curved, Aq)],
+                ),
                 "attitude": (h / 2, ZERO, Fraction(1), [(Fraction(1), Aq)]),
                 "rate": (ZERO, Fraction(1), ZERO, []),
             }[late.kind]
@@ -226,11 +231,11 @@ class Follower(Reader):
                 off, turned = steady.off[0] + (steady.off[1] + curved) * h / 2, steady.off[1] + curved
                 rows[0] = Fraction(1), steady.M
             grown = off * back * more + by * more
-            share = self.share(late, told)
-            own = share * late.most * sum(sizes[x] for x in late.sizes)
+            share = self.share(late, known)
+            alone = share * late.most * sum(sizes[x] for x in late.sizes)
             # What is late beside the torque is in what is asked for.
             rest = {
-                "torque": beside_law + 2 * (tube.late.most - own),
+                "torque": beside_law + 2 * (tube.late.most - alone),
                 "attitude": h / 2 * self.size("r"),
                 "rate": 2 * self.changes(sizes)["r"],
             }[late.kind]
@@ -243,16 +248,16 @@ class Follower(Reader):
                 rest += (steady.off[1] + curved) * h * ahead / 8 * late.mean * e.most
                 kept, behind = steady.kept, ZERO
             M = together([*rows, (grown, Aw), ((off + grown) * gyrating, w)], [near[x] for x in STATE])
-            found.append(Change(late, M, rest, kept + behind * share * late.mean, share))
-        return found
+            lates.append(Change(late, M, rest, kept + behind * share * late.mean, share))
+        return lates
 
     def ends(self, tube: Tube) -> tuple[list[Fraction], Fraction]:
         """Return torques at the beginning and at the end of a period, and a turn, that do no less near the target than what
         is late."""
         sizes, torques, along = tube.region.sizes, [ZERO, ZERO], ZERO
-        told = as_told(self.lately(sizes), self.wrong)
+        known = as_told(self.lately(sizes), self.wrong)
         for one in self.lates:
-            share, (linear, rest) = self.share(one, told), (sizes[x] for x in one.sizes)
+            share, (linear, rest) = self.share(one, known), (sizes[x] for x in one.sizes)
             at_ends = one.ends
             if one.kind == "torque" and self.steady:
                 # Its linear part is in the motion, but for how early it acts; of the rest that alone is not known.

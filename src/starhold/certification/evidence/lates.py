@@ -31,12 +31,12 @@ WEIGHT = 0.9
 
 def numbers_of(lates: Mapping[str, contract.Late]) -> dict[str, float]:
     """Return the numbers of a claim about what is late, before its weights are known."""
-    told = dict[str, dict[str, float]]()
+    by_kind = dict[str, dict[str, float]]()
     for kind, late in lates.items():
-        told[kind] = {"kept": late.kept, "mean": late.mean, "most": late.most, "weight": 1.0, "begun": 0.0, "rest": 0.0}
+        by_kind[kind] = {"kept": late.kept, "mean": late.mean, "most": late.most, "weight": 1.0, "begun": 0.0, "rest": 0.0}
         if late.alike:
-            told[kind] |= {"kept.least": late.kept * LEAST, "mean.least": late.mean * LEAST}
-    return {f"late.{kind}.{name}": x for kind, numbers in told.items() for name, x in numbers.items() if isfinite(x)}
+            by_kind[kind] |= {"kept.least": late.kept * LEAST, "mean.least": late.mean * LEAST}
+    return {f"late.{kind}.{name}": x for kind, numbers in by_kind.items() for name, x in numbers.items() if isfinite(x)}
 
 
 def of_lates(motion: Held) -> dict[str, Fraction]:
@@ -72,12 +72,12 @@ def begun_late(motion: Held, turn: float, rate: float) -> list[Late]:
 def resting(motion: Held, level: float) -> list[Late]:
     """Return what is late with what its part that no weight pays for is at most in {V <= level}; where that is not bounded,
     with none."""
-    found = motion.lates = [replace(late, rest=Fraction(0)) for late in motion.lates]
+    unrested = motion.lates = [replace(late, rest=Fraction(0)) for late in motion.lates]
     try:
-        for more in MARGINS if found else ():
+        for more in MARGINS if unrested else ():
             tube = motion.tube(motion.region(Fraction(level)))
             rests = [rounded(float(one.settled(tube, False)) * more, DIGITS) for one in motion.changes_in(tube)]
             motion.lates = [replace(late, rest=rest) for late, rest in zip(motion.lates, rests, strict=True)]
     except RefusedError:
-        return found
+        return unrested
     return motion.lates

@@ -145,7 +145,7 @@ def points(claim: Claim) -> Proof:
         f" {most('outside')} and {enumerated(errors)}"
     )
     units = {"torque": ("N m", "torque that acts"), "attitude": ("", "attitude that it is told"), "rate": ("rad/s", "rate")}
-    text += "".join(f", the {units[one.kind][1]} late, {one.told(units[one.kind][0])}" for one in motion.lates)
+    text += "".join(f", the {units[one.kind][1]} late, {one.in_words(units[one.kind][0])}" for one in motion.lates)
     text += f", at no time by {above(numbers[WITHIN])} N m" if WITHIN in numbers else ""
     text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
     text += f", with every J_ik off by up to {below(numbers['tolerance'])} sqrt(J_ii J_kk)" if motion.off else ""
