@@ -39,6 +39,21 @@ def flown(over=ANYWHERE, runs=40, **options):
     return fly(scenario=scenario, over=over, requirement=[], runs=runs, proof=True, **options)
 
 
+def told_otherwise(monkeypatch, **numbers):
+    """Claims have other numbers than those that are proved."""
+    begun = proved._subjects
+
+    def false(job, law):
+        subjects, lacking = begun(job, law)
+        others = [{name: number(one.claim.numbers) for name, number in numbers.items()} for one in subjects]
+        return [
+            one._replace(claim=replace(one.claim, numbers=one.claim.numbers | other))
+            for one, other in zip(subjects, others, strict=True)
+        ], lacking
+
+    monkeypatch.setattr(proved, "_subjects", false)
+
+
 def own_runs(found, count):
     """The loop and the recording of every control step of the first runs of a campaign, and their rows."""
     frame = found.frame()
@@ -51,7 +66,7 @@ def own_runs(found, count):
 def test_flights_are_covered_from_when_they_are_in_the_claims_set():
     """Of some runs this is read from recordings, with V of the start by itself."""
     found = flown(runs=12)
-    (claim,) = [law.claim for law in found.laws]
+    (claim,) = found.laws[0].claims
     scenario = steady()
     (issued,) = study_of(scenario.body).certify(scenario, scenario.laws[0], build(scenario, scenario.laws[0]), pointing=True)
     stated = issued.certificate.claim("pointing")
@@ -80,7 +95,7 @@ def test_flights_are_covered_from_when_they_are_in_the_claims_set():
 def test_the_bound_is_that_of_the_funnel_at_the_last_quarter():
     """This claim settles after the flight; what it says of 60 s is weaker, and holds of flights covered from the start."""
     near = steady(initial={"attitude": [1.0, 0.05, 0.0, -0.03]})
-    claim = flown({"initial.rate": {"distribution": "shell", "high": "1 deg/s"}}, scenario=near).laws[0].claim
+    claim = flown({"initial.rate": {"distribution": "shell", "high": "1 deg/s"}}, scenario=near).laws[0].claims[0]
     (issued,) = study_of(near.body).certify(near, near.laws[0], build(near, near.laws[0]), pointing=True)
     stated = issued.certificate.claim("pointing")
     assert stated.numbers["settling"] > 80.0
@@ -92,31 +107,25 @@ def test_the_bound_is_that_of_the_funnel_at_the_last_quarter():
 @pytest.mark.slow
 def test_what_differs_from_the_claims_loop_is_not_covered():
     found = flown({"spacecraft.inertia": normal("3 %", relative=True)}, runs=3)
-    assert found.laws[0].claim.left == {proved.OTHER: 3}
-    assert found.laws[0].claim.within == ()
+    assert found.laws[0].claims[0].left == {proved.OTHER: 3}
+    assert found.laws[0].claims[0].within == ()
     # The claim is against the part's torque and as much again, as [certify] asks.
     torque = uniform(0.0, 4e-4)
     scenario = steady(part=[{"type": "constant-torque", "torque": [1e-4, 0.0, 0.0]}])
     weak = flown({"part[1].torque[1]": torque}, runs=8, scenario=scenario)
     less = int((weak.frame()["part[1].torque[1]"] <= 2e-4).sum())
     assert 0 < less < 8
-    assert weak.laws[0].claim.covered == less
+    assert weak.laws[0].claims[0].covered == less
 
 
 def test_it_is_said_why_nothing_is_proved():
-    modes = {"type": "modes", "mode": [{"name": "one", "type": "pd", "k_rate": 1.0, "k_attitude": 0.3}] * 2}
-    modes["mode"] = [modes["mode"][0] | {"until": {"after": 1.0}}, modes["mode"][1] | {"name": "two"}]
-    one = steady(laws=[modes | {"name": "flown"}])
-    lasting = flown(runs=2, scenario=one).laws[0].claim
-    assert lasting.text == "claims are about single modes"
-    assert lasting.runs == 0
     faulty = steady(fault=[{"time": 40.0, "inertia": [2.1, 3.0, 4.0], "action": "none"}])
-    assert "what changes at 40 s" in flown(runs=2, scenario=faulty).laws[0].claim.text
+    assert "what changes at 40 s" in flown(runs=2, scenario=faulty).laws[0].claims[0].text
 
 
 def test_a_share_of_flights_may_be_beyond_and_more_may_not():
     one = Within("final_attitude_error", "rad", 1.0, 0.5, 1000, 1)
-    claim = ByClaim("", 1000, {}, 0.9973, 0, (one,))
+    claim = ByClaim("", "", 1000, {}, 0.9973, 0, (one,))
     assert not claim.contradicted
     assert replace(claim, share=None).contradicted
     assert replace(claim, within=(replace(one, beyond=30),)).contradicted
@@ -126,18 +135,10 @@ def test_a_share_of_flights_may_be_beyond_and_more_may_not():
 
 
 def test_a_false_claim_is_contradicted(tmp_path, monkeypatch):
-    begun = proved._subject
-
-    def false(job, law):
-        about = begun(job, law)
-        n = about.claim.numbers
-        wrong = n | {"funnel": [(time, angle / 1e4) for time, angle in n["funnel"]]}
-        return about._replace(claim=replace(about.claim, numbers=wrong))
-
-    monkeypatch.setattr(proved, "_subject", false)
+    told_otherwise(monkeypatch, funnel=lambda n: [(time, angle / 1e4) for time, angle in n["funnel"]])
     found = flown({"initial.rate": ANYWHERE["initial.rate"]})
     assert found.contradicted
-    assert found.laws[0].claim.within[0].beyond == found.laws[0].claim.within[0].covered > 0
+    assert found.laws[0].claims[0].within[0].beyond == found.laws[0].claims[0].within[0].covered > 0
     scenario = with_campaign(steady(), {"over": {"initial.rate": ANYWHERE["initial.rate"]}, "runs": 6})
     (tmp_path / "s.toml").write_text(scenario.text)
     told = starhold("campaign", "s.toml", "-o", "d", "--threads", "1", "--proof", cwd=tmp_path)
@@ -148,24 +149,17 @@ def test_a_false_claim_is_contradicted(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_more_wrongly_told_than_assumed_is_counted(monkeypatch):
-    begun = proved._subject
-
-    def quieter(job, law):
-        about = begun(job, law)
-        n = about.claim.numbers
-        return about._replace(claim=replace(about.claim, numbers=n | {"attitude_error": n["attitude_error"] / 1.6}))
-
-    monkeypatch.setattr(proved, "_subject", quieter)
+    told_otherwise(monkeypatch, attitude_error=lambda n: n["attitude_error"] / 1.6)
     over = {"initial.rate": ANYWHERE["initial.rate"]}
-    assert flown(over, runs=4).laws[0].claim.misled is None
+    assert flown(over, runs=4).laws[0].claims[0].misled is None
     told = [{"type": "gyro", "noise": 1e-5}, {"type": "star-tracker", "cross": 2e-5, "roll": 2e-5, "interval": 0.2}]
-    claim = flown(over, scenario=steady(part=told).with_({"sensor": None})).laws[0].claim
+    claim = flown(over, scenario=steady(part=told).with_({"sensor": None})).laws[0].claims[0]
     assert 0 < claim.misled < claim.covered
 
 
 def test_results_are_the_same_with_a_proof():
     plain = fly(scenario=steady(), over=ANYWHERE, requirement=[], runs=6)
-    assert plain.laws[0].claim is None
+    assert plain.laws[0].claims == ()
     assert plain.digest == flown(runs=6).digest
 
 
@@ -206,9 +200,9 @@ def test_a_claim_about_motions_between_jumps_bounds_no_flight(monkeypatch):
     """Nor one about less time than a flight lasts."""
     begun = Claim.limited_to
     monkeypatch.setattr(Claim, "limited_to", lambda claim, until: begun(replace(claim, assumptions=(STEADY,)), until))
-    assert flown(runs=2).laws[0].claim.text == "the claim holds only if the target does not jump"
+    assert flown(runs=2).laws[0].claims[0].text == "the claim holds only if the target does not jump"
     monkeypatch.setattr(Claim, "limited_to", lambda claim, until: begun(replace(claim, assumptions=(f"{UNTIL}79",)), until))
-    assert flown(runs=2).laws[0].claim.text == "the claim holds only if the flight lasts 79 s at most"
+    assert flown(runs=2).laws[0].claims[0].text == "the claim holds only if the flight lasts 79 s at most"
 
 
 WIDE = {
@@ -232,7 +226,7 @@ def test_no_more_flights_than_the_share_are_beyond_what_is_proved(name):
     (scenario, law), (over, changes, runs) = name.split(), ATTACKED[name]
     attacked = sh.load(scenario).with_({"requirement": None} | changes)
     found = sh.campaign(attacked, runs=runs, over=over, law=law, search=False, proof=True)
-    (claim,) = [one.claim for one in found.laws]
+    (claim,) = found.laws[0].claims
     assert claim.covered > runs / 10
     assert not found.contradicted
     assert [one.beyond for one in claim.within] == [0] * len(claim.within)

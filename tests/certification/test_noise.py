@@ -21,7 +21,7 @@ from starhold.certification.evidence.attitude import Loop
 from starhold.certification.proofs import checked
 from starhold.certification.subject import described, make_subject
 from starhold.certification.unmodelled import _rate as goal_rate
-from starhold.certification.unmodelled import change_of_modelled, driven_errors, envelope_of, named, pushes
+from starhold.certification.unmodelled import change_of_modelled, driven_errors, envelope_of, named, noisy_fields, pushes
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
 from starhold.kernel.held import CHANGE
@@ -233,6 +233,21 @@ def test_a_claim_with_its_loops_own_pushes_is_about_that_loop():
     less = str(Fraction(against.outside) * Fraction(999, 1000))
     claim["numbers"]["outside"] = less
     assert list(numbers_apart(claim, own)) == ["outside is exceeded"]
+
+
+def test_the_noise_of_each_magnetometer_is_counted():
+    """A claim that counts one vector a sample is not about a loop with two."""
+    loop = nadir()
+    one, two = (Loop(make_subject(each)) for each in (loop, loop.with_parts(*loop.parts, loop.find("magnetometer"))))
+    assert (noisy_fields(one.loop), noisy_fields(two.loop)) == (1, 2)
+    claim = noise_claim(loop)
+    assert "noise.beside" in claim["numbers"]
+    differs = "the noise.beside.vectors differs"
+    assert differs not in list(numbers_apart(claim, one))
+    assert differs in list(numbers_apart(claim, two))
+    claim["numbers"]["noise.beside.vectors"] = "2"
+    assert differs in list(numbers_apart(claim, one))
+    assert differs not in list(numbers_apart(claim, two))
 
 
 def test_a_torque_that_is_told_changes_as_fast_as_it_does_in_the_loop_of_the_claim():

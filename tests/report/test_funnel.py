@@ -21,7 +21,7 @@ def proved(**tables):
 
 def test_a_flight_from_the_set_is_covered_from_the_start_and_stays_below():
     flight = proved(initial={"attitude": [1.0, 0.05, 0.0, -0.03]})
-    assert flight.covered == ((0.0, 80.0),)
+    assert flight.covered == (((0.0, 80.0),),)
     assert covered_text(flight, 0) == ""
     ((times, most),) = funnel(flight)
     run = flight.recording
@@ -36,7 +36,7 @@ def test_a_flight_from_the_set_is_covered_from_the_start_and_stays_below():
 def test_a_flight_from_outside_is_covered_once_it_is_in_the_set():
     flight = proved()
     claim = flight.certificates[0].claim("pointing")
-    ((begin, end),) = flight.covered
+    (((begin, end),),) = flight.covered
     assert 0.0 < begin < end == 80.0
     assert covered_text(flight, 0) == f"it covers this flight from {begin:g} s on"
     assert any(one.time == 0.0 for one in flight.left(0, "pointing"))
@@ -52,7 +52,7 @@ def test_a_flight_from_outside_is_covered_once_it_is_in_the_set():
 def test_it_ends_where_the_loop_changes():
     fault = {"time": 40.0, "inertia": [2.2, 3.0, 4.0], "action": "none"}
     flight = proved(initial={"attitude": [1.0, 0.05, 0.0, -0.03]}, fault=[fault])
-    assert flight.covered == ((0.0, 40.0),)
+    assert flight.covered == (((0.0, 40.0),),)
     assert [times[-1] for times, _ in funnel(flight)] == [40.0]
 
 
@@ -61,6 +61,6 @@ def test_without_a_proof_there_is_none():
     bare = short(duration=4.0)
     loop = build(bare, bare.laws[0])
     unsought = prove(bare, bare.laws[0], loop, fly_law(bare, bare.laws[0], loop))
-    assert unsought.covered == (None,)
+    assert unsought.covered == ((),)
     assert [*funnel(unsought)] == []
     assert len(flight.covered) == 1

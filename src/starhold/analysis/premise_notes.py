@@ -16,30 +16,34 @@ from starhold.analysis.meter import KINDS, TOLD, Window
 
 PREMISES = "premises"
 """The name of these notes among the extras of a meter."""
+MODES = {"mode": ("mode at the end", "1"), "time_in_mode": ("time since the mode began, at the end", "s")}
+"""The windows of a law of modes, with what they mean and their units."""
 
 
 class Premises(NamedTuple):
     """The largest of a window: the square of the sine of half the angle, and that of the rate, by which the attitude and the
     rate that the law is told are off; the square of the momentum of body and wheels; a wheel's momentum; and how far q0 is
-    below zero."""
+    below zero. modes: at its last instant, the mode and for how long (s) it has flown, for a law of modes."""
 
     attitude: float
     rate: float
     momentum: float
     wheel: float
     other: float
+    modes: tuple[float, ...]
 
 
 class Masses(NamedTuple):
-    """The inertia of the body (kg m2) and the axes of its wheels."""
+    """The inertia of the body (kg m2) and the axes of its wheels; modes: a zero for each of `MODES`, for a law of modes."""
 
     inertia: Any
     axes: tuple[Vector, ...]
+    modes: tuple[float, ...] = ()
 
 
 def begun(masses: Masses | None) -> Any:
     """The notes before a flight; none where none are wanted."""
-    return () if masses is None else Premises(*(0.0,) * len(Premises._fields))
+    return () if masses is None else Premises(0.0, 0.0, 0.0, 0.0, 0.0, masses.modes)
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
@@ -57,6 +61,7 @@ def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
         maximum(seen.momentum, dot(total, total)),
         maximum(seen.wheel, most(rotors)) if rotors else seen.wheel,
         maximum(seen.other, -quantities["attitude_error"][0]),
+        (quantities["mode"], quantities["time_in_mode"]) if seen.modes else (),
     )
 
 
@@ -70,4 +75,5 @@ def windows(rows: Any) -> dict[str, Window]:
         "momentum": Window(rows.momentum, np.sqrt, "momentum of body and wheels", "N m s"),
         "wheel_momentum": Window(rows.wheel, KINDS["number"], "momentum of a wheel", "N m s"),
         "other_quaternion": Window(rows.other, KINDS["number"], "how far q0 is below zero", "1"),
+        **{name: Window(row, KINDS["number"], *MODES[name]) for name, row in zip(MODES, rows.modes, strict=False)},
     }

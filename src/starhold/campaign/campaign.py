@@ -149,7 +149,7 @@ def fly_campaign(
         taken = set[str]()
         results = tuple(replace(result, brackets=brackets(job, store, result, threads, taken, notice)) for result in results)
     if options.proof:
-        results = tuple(replace(result, claim=look(job, result.law, threads, notice)) for result in results)
+        results = tuple(replace(result, claims=look(job, result.law, threads, notice)) for result in results)
     sealed = digest(store, runs)
     totals = {
         "verdicts": {

@@ -1,5 +1,5 @@
 """Brackets by the claim about a loop as it flies: for each flight it is found when it meets the claim's premises, and from
-then on the claim bounds it.
+then on the claim bounds it. Of a law of modes each claim is about the flights that end in its mode, from when that began.
 
 A flight has them from the start where it starts in the claim's set, or from a window of time on in which its angles and
 rates are in that set, the law is told no more wrongly than the claim assumes, and the momentum is within its bound: so a
@@ -9,7 +9,7 @@ loop, in all numbers but the start."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -30,6 +30,7 @@ from starhold.certification.comparison import differences
 from starhold.certification.wording import enumerated, sentence
 from starhold.kernel.numbers import rational
 from starhold.loop.closed_loop import ClosedLoop, is_recorded
+from starhold.loop.modes import loop_of_mode
 from starhold.scenario.building import build
 from starhold.simulation.lanes import ThreadPool
 from starhold.studies.body import Issued, study_of
@@ -46,15 +47,18 @@ NEARLY = 0.9
 """The bound of the final angle is the least that holds for this share of the flights that have one by the last quarter."""
 START = ("state.attitude", "state.rate", "memories.", "h")
 """Numbers that a claim does not depend on but through the start begin with these."""
-OUTSIDE, OTHER, MOVED = "do not come into its set", "fly another loop", "have more momentum"
+OUTSIDE, OTHER, MOVED = "do not come into its set", "fly another loop", "have more momentum, as certify.momentum may state"
+ELSEWHERE, NEARER = "end in another mode", "are bounded by a narrower claim"
 """Why flights are not covered."""
 
 
 class Looked(NamedTuple):
-    """This is found of flights (lanes,): from which control step on they are in the claim's set with an estimate that has
-    settled, -1 for never; whether their momentum is within its bound from then on; whether the law is told more wrongly than
-    is assumed; whether they fly the claim's loop; and their metrics from then on."""
+    """This is found of flights (lanes,): whether they end in the claim's mode; from which control step on they are in
+    the claim's set with an estimate that has settled, -1 for never; whether their momentum is within its bound from then
+    on; whether the law is told more wrongly than is assumed; whether they fly the claim's loop; and their metrics from
+    then on."""
 
+    there: NDArray[np.bool_]
     begun: Array
     kept: NDArray[np.bool_]
     misled: NDArray[np.bool_]
@@ -63,12 +67,16 @@ class Looked(NamedTuple):
 
 
 class Subject(NamedTuple):
-    """A claim about a law's loop as it flies, and the loop."""
+    """A claim about a law's loop as it flies, and the number of control steps of a flight."""
 
     claim: Claim
     issued: Issued
-    loop: ClosedLoop
     steps: int
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """The loop that the claim is about."""
+        return self.issued.loop
 
     @property
     def is_watched(self) -> bool:
@@ -86,9 +94,26 @@ class Subject(NamedTuple):
         return inside & (shown["other_quaternion"] <= 0.0) & kept
 
 
-def look(job: Job, law: str, threads: int, notice: Notice | None = None) -> ByClaim:
-    """Compare what is proved of a law with the flights of its campaign, which are flown once more. notice: called with the
-    law and how many more are flown, and what for."""
+class Last(NamedTuple):
+    """The mode, counted from 1, in which flights (lanes,) end, and the control step at which it began; 0 without modes."""
+
+    mode: Array
+    begun: Array
+
+    @staticmethod
+    def of(shown: Mapping[str, Array], ended: Array, period: float) -> Last:
+        """Read them from the windows (windows, lanes) of flights that end, or diverge, at control steps (lanes,)."""
+        none = np.zeros(shown["torque"].shape[1])
+        if "mode" not in shown:
+            return Last(none, none)
+        modes, lanes = np.rint(shown["mode"]), np.arange(len(none))
+        place = len(modes) - 1 - (modes[::-1] > 0.0).argmax(axis=0)
+        return Last(modes[place, lanes], ended - np.rint(shown["time_in_mode"][place, lanes] / period))
+
+
+def look(job: Job, law: str, threads: int, notice: Notice | None = None) -> tuple[ByClaim, ...]:
+    """Compare what is proved of a law, or of each of its modes, with the flights of its campaign, which are flown once more.
+    notice: called with the law and how many more are flown, and what for."""
     watching = Job(job.source, job.table, extras=(PREMISES,))
     lanes = watching.lanes(law)
     names = {name for places in lanes.moved.values() for name in _names(lanes.base.names, places)}
@@ -96,45 +121,55 @@ def look(job: Job, law: str, threads: int, notice: Notice | None = None) -> ByCl
     runs = min(job.table.runs, MOST if alike else APART)
     tell = partial(notice or (lambda law, more, sought: None), law, sought=Sought("proof", runs))
     tell(0)
-    about = _subject(job, law)
-    if isinstance(about, str):
+    subjects, lacking = _subjects(job, law)
+    if not subjects and None in lacking:
         tell(runs)
-        return ByClaim(about)
-    seen, meter = list[Looked](), watching.meter(law)
+        return (ByClaim(*lacking[None]),)
+    meter, seen = watching.meter(law), [list[Looked]() for _ in subjects]
+    modes = list[Array]()
     with ThreadPool(threads) as pool:
         for first in range(0, runs, BLOCK):
             count = min(BLOCK, runs - first)
             columns, numbers = watching.plan.columns(first, count), np.arange(first, first + count)
             loops = partial(_loops, watching, law)
-            take = partial(_take, about, meter, seen, None if alike else loops)
+            take = partial(_take, subjects, meter, seen, modes, None if alike else loops)
             watching.measure(law, columns, numbers, pool, take)()
             tell(count)
-    return _judged(about, seen)
+    ended = np.concatenate(modes)
+    counts = ((why, int((ended == mode).sum())) for mode, why in lacking.items())
+    others = (ByClaim(name, f"{why}; {count} of {runs} flights end in this mode") for (name, why), count in counts if count)
+    return (*_judged(subjects, seen), *others)
 
 
-def _subject(job: Job, law: str) -> Subject | str:
-    """Return the claim about a law's loop that flies at the end of a flight, or why there is none."""
+def _subjects(job: Job, law: str) -> tuple[list[Subject], dict[int | None, tuple[str, str]]]:
+    """Return the claims about the loop that a law, or a mode of it, has at the end of a flight, and for each mode without
+    such a claim, or None for all of the law, the name of its certificate and why there is none."""
     scenario, study = job.scenario, study_of(job.scenario.body)
     if scenario.supposed is not None:
-        return "the law's nominal model is not the craft that flies"
+        return [], {None: (law, "the law's nominal model is not the craft that flies")}
     entry = scenario.pick(law)
     loop, steps = build(scenario, entry), scenario.table.simulation.steps
-    why = "no claim is about the loop as it flies"
+    subjects, lacking = list[Subject](), dict[int | None, tuple[str, str]]()
     for one in reversed(study.certify(scenario, entry, loop, pointing=True)):
-        claim = one.certificate.claim("pointing")
-        if one.mode is not None or one.before is not None:
-            why = "claims are about single modes"
-        elif claim is None or claim.outcome != "proved":
-            why = one.certificate.unflown or why
+        claim, lacks = one.certificate.claim("pointing"), ""
+        if subjects and one.mode is None:
+            break
+        if claim is None or claim.outcome != "proved":
+            lacks = one.certificate.unflown or "no claim is about the loop as it flies"
         elif claim.left_out:
-            why = f"the claim leaves out {enumerated(claim.left_out)}"
+            lacks = f"the claim leaves out {enumerated(claim.left_out)}"
         elif condition := claim.limited_to(steps * loop.period):
-            why = f"the claim holds only if {condition}"
+            lacks = f"the claim holds only if {condition}"
         elif (change := study.ends(one, loop, steps * loop.period)) is not None:
-            why = f"the claim ends with what changes at {change * loop.period:g} s"
+            lacks = f"the claim ends with what changes at {change * loop.period:g} s"
+        elif one.loop.craft.inertia != loop.craft.inertia:
+            lacks = "the momentum of flights is noted with the inertia of their start"
         else:
-            return Subject(claim, one, loop, steps)
-    return why
+            subjects.insert(0, Subject(claim, one, steps))
+        if lacks and one.before is None:
+            lacking[one.mode] = one.certificate.name, lacks
+    proved = {one.issued.mode for one in subjects}
+    return subjects, {mode: why for mode, why in reversed(lacking.items()) if mode not in proved}
 
 
 def _names(names: tuple[str, ...], places: set[int]) -> Iterator[str]:
@@ -149,32 +184,54 @@ def _loops(job: Job, law: str, lot: Lot) -> Iterator[ClosedLoop]:
 
 
 def _take(
-    about: Subject,
+    subjects: Sequence[Subject],
     meter: Meter,
-    seen: list[Looked],
+    seen: Sequence[list[Looked]],
+    modes: list[Array],
     loops: Callable[[Lot], Iterator[ClosedLoop]] | None,
     metrics: Metrics,
     windows: Array,
     lot: Lot,
 ) -> None:
     """Look at the flights of a lot by their metrics and the largest values (windows, quantities, lanes) of windows."""
-    n, begins = about.claim.numbers, np.array([0, *meter.cuts()[:-1]])
     rows = [window.value(windows[:, k]) for k, window in enumerate(meter.windows.values())]
     shown: dict[str, Array] = dict(zip(meter.windows, rows, strict=True))
+    lost, begins = metrics["diverged_at"], np.array([0, *meter.cuts()[:-1]])
+    last = Last.of(shown, np.where(np.isnan(lost), meter.steps, lost / meter.instant), meter.instant)
+    modes.append(last.mode)
+    each = None if loops is None else list(loops(lot))
+    for about, looked in zip(subjects, seen, strict=True):
+        looked.append(_look(about, metrics, shown, begins, last, lot, each))
+
+
+def _look(
+    about: Subject,
+    metrics: Metrics,
+    shown: Mapping[str, Array],
+    begins: Array,
+    last: Last,
+    lot: Lot,
+    loops: Sequence[ClosedLoop] | None,
+) -> Looked:
+    """Look at flights by their windows, which begin at these control steps; loops: of each flight, where they differ in more
+    than the start."""
+    n, mode = about.claim.numbers, about.issued.mode
     more = 1.0 + SLACK
     right = (shown["told_attitude"] <= n["attitude_error"] * more) & (shown["told_rate"] <= n["rate_error"] * more)
     light = shown["momentum"] <= n.get("momentum", math.inf) * more
     inside = about.holds(shown)
     alike = np.ones(inside.shape[1], dtype=bool)
     if loops is not None:
-        alike, starts = np.array([_apart(about, loop) for loop in loops(lot)]).T
+        alike, starts = np.array([_apart(about, loop) for loop in loops]).T
         inside[0] |= starts
-    elif not about.issued.step:
+    elif not about.issued.step and mode in (None, 1):
         inside[0] |= _starts_inside(about, lot)
     # An estimate may be right before it has settled, for which it has half of the flight.
     place, starts_by = np.arange(len(begins))[:, None], begins[:, None]
     settles = np.where(~right & (starts_by < about.steps / 2.0), place, -1).max(axis=0)
-    enters = right & inside & (starts_by >= about.issued.step) & (place > settles)
+    there = np.ones_like(alike) if mode is None else last.mode == mode
+    flies = there & (starts_by >= np.maximum(last.begun, about.issued.step))
+    enters = right & inside & flies & (place > settles)
     within = enters & light
     first = np.where(within.any(axis=0), within.argmax(axis=0), enters.argmax(axis=0))
     begun = np.where(enters.any(axis=0), begins[first], -1)
@@ -186,7 +243,7 @@ def _take(
     }
     lost = ~np.isnan(metrics["diverged_at"])
     values = {name: np.where(lost, np.nan, x) for name, x in values.items()}
-    seen.append(Looked(begun, (light | ~later).all(axis=0), (later & ~right).any(axis=0), alike, values))
+    return Looked(there, begun, (light | ~later).all(axis=0), (later & ~right).any(axis=0), alike, values)
 
 
 def _starts_inside(about: Subject, lot: Lot) -> NDArray[np.bool_]:
@@ -203,31 +260,43 @@ def _starts_inside(about: Subject, lot: Lot) -> NDArray[np.bool_]:
 def _apart(about: Subject, loop: ClosedLoop) -> tuple[bool, bool]:
     """Return whether a run's own loop is one that the claim is about, and whether it starts in the claim's set."""
     proof: Any = about.claim.proof
-    now = replace(loop, events=())
-    alike = not about.issued.step and not differences(proof.claim, now)
-    return alike, alike and start_inside(about.issued.certificate, now).get("pointing", False)
+    now, mode = replace(loop, events=()), about.issued.mode
+    now = now if mode is None else loop_of_mode(now, mode - 1)
+    stays = not about.issued.step and all(event.step > about.steps for event in loop.events)
+    alike = stays and not differences(proof.claim, now)
+    begins = alike and mode in (None, 1)
+    return alike, begins and start_inside(about.issued.certificate, now).get("pointing", False)
 
 
-def _judged(about: Subject, seen: list[Looked]) -> ByClaim:
-    columns: Any = zip(*(one[:4] for one in seen), strict=True)
-    begun, kept, misled, alike = (np.concatenate(column) for column in columns)
-    values = {name: np.concatenate([one.values[name] for one in seen]) for name in seen[0].values}
-    there = begun >= 0
-    covered = there & kept & alike
-    left = {OTHER: ~alike, OUTSIDE: alike & ~there, MOVED: alike & there & ~kept}
-    share = about.claim.numbers["share"]
-    if share:
-        # A flight is as many spans of time as its control steps begin.
-        spans = math.ceil((about.steps + 1 - about.issued.step) / about.claim.numbers["samples"])
-        share = max(1.0 - spans * (1.0 - share), 0.0)
-    return ByClaim(
-        sentence(about.claim, about.issued.certificate.subject),
-        len(begun),
-        {why: int(which.sum()) for why, which in left.items() if which.any()},
-        share,
-        int((covered & misled).sum()) if about.is_watched else None,
-        tuple(_within(about, covered, begun, values)),
-    )
+def _judged(subjects: Sequence[Subject], seen: Sequence[list[Looked]]) -> Iterator[ByClaim]:
+    """Yield what is found of each claim whose mode flights end in; that with more momentum is about those that are left."""
+    bounded: dict[int | None, NDArray[np.bool_]] = {}
+    for about, looked in zip(subjects, seen, strict=True):
+        columns: Any = zip(*(one[:5] for one in looked), strict=True)
+        ends, begun, kept, misled, alike = (np.concatenate(column) for column in columns)
+        values = {name: np.concatenate([one.values[name] for one in looked]) for name in looked[0].values}
+        nearer, mode = bounded.get(about.issued.mode, np.zeros_like(ends)), about.issued.mode
+        if not (ends & ~nearer).any():
+            continue
+        here, enters = alike & ends & ~nearer, begun >= 0
+        covered = here & enters & kept
+        bounded[mode] = nearer | covered
+        left = {ELSEWHERE: ~ends, NEARER: nearer, OTHER: ends & ~nearer & ~alike}
+        left |= {OUTSIDE: here & ~enters, MOVED: here & enters & ~kept}
+        share = about.claim.numbers["share"]
+        if share:
+            # A flight is as many spans of time as its control steps begin.
+            spans = math.ceil((about.steps + 1 - about.issued.step) / about.claim.numbers["samples"])
+            share = max(1.0 - spans * (1.0 - share), 0.0)
+        yield ByClaim(
+            about.issued.certificate.name,
+            sentence(about.claim, about.issued.certificate.subject),
+            len(begun),
+            {why: int(which.sum()) for why, which in left.items() if which.any()},
+            share,
+            int((covered & misled).sum()) if about.is_watched else None,
+            tuple(_within(about, covered, begun, values)),
+        )
 
 
 def _within(about: Subject, covered: NDArray[np.bool_], begun: Array, values: Mapping[str, Array]) -> Iterator[Within]:

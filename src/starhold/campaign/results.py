@@ -101,11 +101,13 @@ class Within:
 
 @dataclass(frozen=True)
 class ByClaim:
-    """A claim about a law's loop as it flies, compared with its flights. text: the claim, or why nothing is claimed of them;
-    runs: flights that were compared with it; left: how many do not meet its premises, by the reason; share: of flights of
-    which the claim holds, None for all; misled: in how many of the others the law was told more wrongly than the claim
-    assumes for this share, None where what it is told is not recorded; within: the metrics that it bounds."""
+    """A claim about a law's loop as it flies, compared with its flights. about: the name of its certificate, that of the
+    law or one that also tells its mode; text: the claim, or why nothing is claimed of them; runs: flights that were
+    compared with it; left: how many do not meet its premises, by the reason; share: of flights of which the claim holds,
+    None for all; misled: in how many of the others the law was told more wrongly than the claim assumes for this share,
+    None where what it is told is not recorded; within: the metrics that it bounds."""
 
+    about: str
     text: str
     runs: int = 0
     left: Mapping[str, int] = field(default_factory=dict[str, int])
@@ -150,8 +152,8 @@ class LawResult:
     """Sensitivity of metrics, by their names, if the sampling was designed for it."""
     again: tuple[Again, ...] = ()
     brackets: tuple[Bracket, ...] = ()
-    claim: ByClaim | None = None
-    """The brackets by a claim; None unless a proof was requested."""
+    claims: tuple[ByClaim, ...] = ()
+    """The brackets by claims, one for each mode of a law of modes; none unless a proof was requested."""
 
     def __repr__(self) -> str:
         judged = "".join(f"; {verdict.name} {verdict.outcome}" for verdict in self.verdicts)
@@ -184,7 +186,7 @@ class CampaignResult:
     @property
     def contradicted(self) -> bool:
         """Whether a flight contradicts a proof, which is a fault of starhold."""
-        every = (one for law in self.laws for one in (*law.brackets, law.claim) if one is not None)
+        every = (one for law in self.laws for one in (*law.brackets, *law.claims))
         return any(one.contradicted for one in every)
 
     def frame(self) -> DataFrame:

@@ -19,12 +19,16 @@ from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
 from starhold.certification.subject import make_subject
+<<<<<<< HEAD
 from starhold.certification.unmodelled import LARGER, Pushes, change_of_modelled, driven_errors, lates, samples_of
+=======
+from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, noisy_fields, samples_of
+>>>>>>> main
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.plans import PLANNED
-from starhold.kernel.theorems.noise import BESIDE, DEVIATION
+from starhold.kernel.theorems.noise import BESIDE, DEVIATION, VECTORS
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS, Late
 from starhold.parts.effectors.wheel_motion import at_top_speed
@@ -97,6 +101,8 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
     if "share" in numbers and (driven := driven_errors(loop)) is not None:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
+        exactly[VECTORS] = noisy_fields(loop)
+        numbers |= {} if VECTORS in numbers or BESIDE not in numbers else {VECTORS: Fraction(1)}
     if claim["theorem"] in (POINTS, APPENDED):
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
@@ -141,7 +147,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         )
 
 
-def _late(numbers: Mapping[str, Fraction], lates_told: Mapping[str, Late]) -> Iterator[str]:
+def _late(numbers: Mapping[Any, Fraction], lates_told: Mapping[str, Late]) -> Iterator[str]:
     for kind in {name.split(".")[1] for name in numbers if name.startswith("late.")}:
         if kind not in lates_told:
             yield f"its {kind} is not late"

@@ -334,9 +334,9 @@ def _field_error(fitted: Fitted, period: float, noisy: bool) -> float:
     return inf if error is None or (deviation and not noisy) else error.field + DEVIATIONS * deviation
 
 
-def measures_noisy_field(loop: ClosedLoop) -> bool:
-    """Return whether a sensor measures the magnetic field with noise."""
-    return any(_noise(fitted, loop.period).field for fitted in loop.used("sensor"))
+def noisy_fields(loop: ClosedLoop) -> int:
+    """Return how many sensors measure the magnetic field with noise."""
+    return sum(bool(_noise(fitted, loop.period).field) for fitted in loop.used("sensor"))
 
 
 def _noise(fitted: Fitted, period: float) -> Noise:

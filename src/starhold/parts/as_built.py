@@ -18,7 +18,7 @@ from starhold.algebra.scalar import Scalar
 from starhold.algebra.several import each
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import IDENTITY, Matrix, Vector, add, apply, clip_axes, diagonal, multiply, scale
-from starhold.parts.contract import Parameter
+from starhold.parts.contract import NoMemory, Parameter
 from starhold.parts.random import Dice
 
 Turn: TypeAlias = Quaternion | tuple[()]
@@ -146,6 +146,12 @@ def awaited(sensor: Any, late: Late, state: Any, names: Sequence[str]) -> Any:
     """The memory at the start, with that of a sensor itself: these fields of the state were always what they are then."""
     count = late.periods + bool(late.share or late.jitter) if late else 0
     return Waiting(sensor, (tuple(getattr(state, name) for name in names),) * count) if late else sensor
+
+
+def see_start(params: Any, state: Any) -> Any:
+    """The memory at the start of a sensor that remembers nothing itself and looks at the craft's place: the state where it
+    is late."""
+    return awaited(NoMemory(), params.late, state, PLACE)
 
 
 def arrived(state: Any, memory: Any, late: Late, names: Sequence[str], dice: Dice, place: int) -> tuple[Any, Any, Any]:

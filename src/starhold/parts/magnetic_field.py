@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import reduce
-from math import factorial, sqrt
+from functools import cache, reduce
+from math import ceil, cos, factorial, pi, radians, sqrt
 from typing import Any, NamedTuple, TypeAlias
 
 from starhold.algebra.circular import cosine_sine
@@ -27,6 +27,8 @@ GROUND = 6.35e6
 """A distance (m) from the Earth's centre that is below ground everywhere."""
 FIRST, LAST = (days_of((year, 1.0, 1.0, 0.0, 0.0, 0.0)) for year in (2025.0, 2030.0))
 """Days since J2000 that the coefficients are for."""
+GRID = radians(2.0)
+"""The angle between places at which the field is measured for a bound of its strength."""
 Row: TypeAlias = tuple[int, int, float, float, float, float]
 ROWS: tuple[Row, ...] = (
     (1, 0, -29350.0, 0.0, 12.6, 0.0),
@@ -106,18 +108,36 @@ def prepared(epoch: Date, period: float = 1.0, rows: tuple[Row, ...] = ROWS) -> 
     return Numbers(cosines, sines, sidereal(days), period)
 
 
+@cache
 def strongest(epoch: Date, distance: float) -> float:
     """A bound of the field's strength (T) from a distance (m) from the Earth's centre on, at an epoch (UTC).
 
-    In no direction do the harmonics of degree n give more than n + 1 times the root of the sum of their squared
-    coefficients, by the addition theorem; they fall with the power n + 2 of the distance. Errors as of `prepared`.
+    Farther away the strength is nowhere more than the largest on this sphere, for it is subharmonic. On a great circle
+    through the place of the largest, the field's part along it is a trigonometric polynomial, of one degree more than the
+    harmonics, and within an angle a of its maximum no less than cos(degree a) of that (Riesz), so that a grid tells. Errors
+    as of `prepared`.
     """
-    days = _known(epoch)
-    total = 0.0
-    for degree in range(1, ROWS[-1][0] + 1):
-        squares = [g * g + h * h for n, _, g, h in _at(days, ROWS) if n == degree]
-        total += (degree + 1.0) * sqrt(sum(squares)) * (RADIUS / distance) ** (degree + 2)
-    return 1e-9 * total
+    import numpy as np
+
+    from starhold.trace.straight_line import evaluated, straight_line
+
+    def equation(position: Vector, cosines: Any, sines: Any) -> Vector:
+        return earth_fixed(position, numbers._replace(cosines=cosines, sines=sines))
+
+    numbers, most = prepared(epoch), 0.0
+    given: dict[str, Any] = {"cosines": numbers.cosines, "sines": numbers.sines}
+    program = straight_line(equation, position=(0.0, 0.0, 0.0), **given)
+    for latitude in np.linspace(-pi / 2.0, pi / 2.0, round(pi / GRID) + 1):
+        across = distance * np.cos(latitude)
+        longitude = np.linspace(0.0, 2.0 * pi, 1 + ceil(2.0 * pi * across / distance / GRID))
+        place: Any = (
+            across * np.cos(longitude),
+            across * np.sin(longitude),
+            np.full_like(longitude, distance * np.sin(latitude)),
+        )
+        most = max(most, float(np.linalg.norm(evaluated(program, position=place, **given), axis=0).max()))
+    # No place is as far from its nearest on the grid as three quarters of the grid's step.
+    return most / cos((ROWS[-1][0] + 1) * 0.75 * GRID)
 
 
 def _known(epoch: Date) -> float:

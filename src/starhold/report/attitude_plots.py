@@ -154,10 +154,11 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario) -> Plot:
 def funnel(flight: Flight) -> Iterator[tuple[Curve, Curve]]:
     """Yield for each certificate times (s) and the angles (rad) that the flight is proved not to exceed from then on, while
     the claim covers the flight."""
-    for certificate, between in zip(flight.certificates, flight.covered, strict=True):
+    for certificate, every in zip(flight.certificates, flight.covered, strict=True):
         claim = certificate.claim("pointing")
-        if claim is not None and between is not None:
-            begin, end = between
+        if claim is None:
+            continue
+        for begin, end in every:
             times, most = np.array(claim.numbers["funnel"]).T
             there = begin + times < end
             yield np.append(begin + times[there], end), np.append(most[there], most[there][-1])

@@ -183,17 +183,15 @@ def claims(result: CampaignResult, words: Wording) -> Section | None:
     no proof was requested."""
     rows: list[list[Any]] = []
     sentences: list[str] = []
-    for number, law in enumerate(result.laws):
-        claim = law.claim
-        if claim is None:
-            continue
-        sentences += [f"{law.law}: {CONTRADICTED}"] if claim.contradicted else []
-        sentences.append(f"{law.law}: {_claimed(claim)}")
+    for number, claim in ((number, claim) for number, law in enumerate(result.laws) for claim in law.claims):
+        sentences += [f"{claim.about}: {CONTRADICTED}"] if claim.contradicted else []
+        sentences.append(f"{claim.about}: {_claimed(claim)}")
         for item in claim.within:
             measure = words.measure(item.metric, item.unit)
             text = f"{'no value' if math.isnan(item.flown) else with_unit(item.flown, measure)} ≤ "
             beyond = f"{count_text(item.beyond)} of {count_text(item.covered)}"
-            rows.append([measure.heading, law_cell(result, number), text + with_unit(item.proved, measure), beyond])
+            named = law_cell(result, number)._replace(text=claim.about)
+            rows.append([measure.heading, named, text + with_unit(item.proved, measure), beyond])
     if not sentences:
         return None
     columns = [*map(Column, ("metric", "law")), *numbers("worst flown ≤ proved", "flights beyond")]

@@ -56,11 +56,14 @@ def left_text(flight: Flight, certificate: int, kind: str) -> str:
 def covered_text(flight: Flight, certificate: int) -> str:
     """State between which times the claim of a certificate about the loop as it flies covers a flight, where it does not
     cover it from the start; empty where it does, and where it covers nothing of it."""
-    between, moment = flight.covered[certificate] if flight.covered else None, flight.metric_set.moment
-    if between is None or not between[0]:
+    from starhold.certification.wording import listed
+
+    times, moment = flight.covered[certificate] if flight.covered else (), flight.metric_set.moment
+    last = float(flight.recording["time"][-1])
+    if not times or (len(times) == 1 and not times[0][0]):
         return ""
-    until = "" if between[1] >= float(flight.recording["time"][-1]) else f" to {moment(between[1], 4)}"
-    return f"it covers this flight from {moment(between[0], 4)}{until or ' on'}"
+    shown = [f"from {moment(begin, 4)} {'on' if end >= last else f'to {moment(end, 4)}'}" for begin, end in times]
+    return f"it covers this flight {listed(shown)}"
 
 
 def unflown_text(certificate: Certificate) -> tuple[str, str]:

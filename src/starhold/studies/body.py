@@ -99,9 +99,10 @@ class BodyStudy:
         """Describe how a run leaves the proved claims of a certificate, by their kinds."""
         return {}
 
-    def covered(self, issued: Issued, loop: Any, run: Recording) -> tuple[float, float] | None:
-        """Return the times (s) between which the claim about the loop as it flies covers a run; None where it never does."""
-        return None
+    def covered(self, issued: Issued, loop: Any, run: Recording) -> tuple[tuple[float, float], ...]:
+        """Return the times (s) between which the claim about the loop as it flies covers a run, for each time that the
+        claim's loop flies; empty where it never does."""
+        return ()
 
     def ends(self, issued: Issued, loop: Any, time: float) -> int | None:
         """Return the control step at which a flight of this duration (s) has another loop than a certificate is about; None

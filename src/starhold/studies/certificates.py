@@ -44,7 +44,7 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
     for entry in scenario.laws:
         loop = build(scenario, entry)
         loops |= certified_loops(scenario, entry, loop) if scenario.body == "rigid-body" else {entry.name: loop}
-        ends |= handed_over(entry, loop) if scenario.body == "rigid-body" else {}
+        ends |= handed_over(scenario, entry, loop) if scenario.body == "rigid-body" else {}
     differing: list[str] = []
     for given in content["certificates"]:
         places = [claim["proof"] for claim in given["claims"] if "proof" in claim]

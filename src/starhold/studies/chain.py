@@ -142,17 +142,20 @@ def sentence(links: Sequence[Link]) -> str:
 
 
 def chains(scenario: Scenario, certificates: list[Certificate], law: str | None = None) -> dict[str, list[Link]]:
-    """Return the links of each law of modes of a scenario, or of one, by the law's name."""
+    """Return the links of each law of modes of a scenario, or of one, initially and after each fault that it knows of, by
+    the begin of their certificates' names."""
     from starhold.laws.modes import mode_laws
     from starhold.scenario.building import build
+    from starhold.studies.bodies.rigid_body import named_loops
 
-    def built(entry: LawEntry) -> list[Link]:
+    def built(entry: LawEntry) -> list[tuple[str, ClosedLoop, int]]:
         loop = build(scenario, entry)
         modes = mode_laws(loop.law, loop.gains) if scenario.body == "rigid-body" else []
-        return links_of(loop, entry.name, {one.name: one for one in certificates}) if modes else []
+        return named_loops(scenario, entry, loop) if modes else []
 
-    entries = scenario.laws if law is None else (scenario.pick(law),)
-    return {entry.name: links for entry in entries if (links := built(entry))}
+    entries, issued = scenario.laws if law is None else (scenario.pick(law),), {one.name: one for one in certificates}
+    every = [one for entry in entries for one in built(entry)]
+    return {name: links for name, loop, _ in every if (links := links_of(loop, name, issued))}
 
 
 def _flown(certificate: Certificate | None) -> Claim | None:

@@ -50,7 +50,7 @@ class Flight:
     """All that is proved of the law on this spacecraft, initially and after faults."""
     departures: tuple[Mapping[str, tuple[Departure, ...]], ...] = ()
     """The departures of this flight from the proved claims of each certificate, by their kinds."""
-    covered: tuple[tuple[float, float] | None, ...] = ()
+    covered: tuple[tuple[tuple[float, float], ...], ...] = ()
     """The times (s) between which the claim of each certificate about the loop as it flies covers this flight."""
 
     modes: tuple[Begun, ...] = ()

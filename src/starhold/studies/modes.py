@@ -255,26 +255,34 @@ def left_momentum(one: HandOver, rate: float) -> float:
     return one.levels.get(RELEASED, math.inf) + float(np.linalg.eigvalsh(tensor(one.after.craft.inertia))[-1]) * rate
 
 
-def mode_departures(issued: Issued, run: Recording, fault: int | None) -> dict[str, tuple[Departure, ...]]:
-    """How a run leaves the proved claims about a mode, or about the hand-over to it, while that mode flies. fault: the
-    control step of the first one (None: there is none), after which no certificate speaks of any mode."""
-    from starhold.analysis.departure import CHANGES, Departure, departures
-
+def flown_stretches(issued: Issued, run: Recording, end: int | None) -> list[Stretch]:
+    """Return the stretches of a recorded run in which the mode flies that a certificate is about, after the mode before if
+    it is about a switch, and with the certificate's loop, which flies up to the control step `end` (None: always)."""
     flown = stretches(run)
     befores = [None, *(one.mode for one in flown)]
     spans = [
-        one
+        one._replace(first=max(one.first, issued.step), last=one.last if end is None else min(one.last or end, end))
         for one, before in zip(flown, befores, strict=False)
-        if one.mode == issued.mode and issued.before in (None, before)
+        # A switch before the certificate's loop flew is none of it.
+        if one.mode == issued.mode and (issued.before is None or (issued.before == before and one.first >= issued.step))
     ]
+    return [one for one in spans if one.last is None or one.first < one.last]
+
+
+def mode_departures(issued: Issued, run: Recording, end: int | None) -> dict[str, tuple[Departure, ...]]:
+    """How a run leaves the proved claims about a mode, or about the hand-over to it, while that mode flies with the loop of
+    the claims, up to the control step `end` (None: always)."""
+    from starhold.analysis.departure import CHANGES, Departure, departures
+
+    spans = flown_stretches(issued, run, end)
     if not spans:
-        never = Departure(0.0, "this flight has no such mode" if issued.before is None else "this flight has no such switch")
+        what = "mode" if issued.before is None else "switch"
+        lacks = "" if end is None and not issued.step else " while it has the loop of the claim"
+        never = Departure(0.0, f"this flight has no such {what}{lacks}")
         return {claim.kind: (never,) for claim in issued.certificate.claims if claim.outcome == "proved"}
     reasons: dict[str, set[Departure]] = {}
     for one in spans:
-        last, change = one.last, NEXT
-        if fault is not None and (last is None or fault < last):
-            last, change = max(fault, one.first), CHANGES
-        for kind, left in departures(issued.certificate, issued.loop, run, one.first, last, change).items():
+        change = CHANGES if end is not None and one.last == end else NEXT
+        for kind, left in departures(issued.certificate, issued.loop, run, one.first, one.last, change).items():
             reasons.setdefault(kind, set()).update(left)
     return {kind: tuple(sorted(left)) for kind, left in reasons.items()}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.matrices import floats
-from starhold.certification.unmodelled import driven_errors, measures_noisy_field, samples_of
+from starhold.certification.unmodelled import driven_errors, noisy_fields, samples_of
 from starhold.kernel.follower import steadied
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
@@ -22,6 +22,7 @@ from starhold.kernel.theorems.noise import (
     CORRECTED,
     DEVIATION,
     SHARE,
+    VECTORS,
     driven,
     linear,
     parts_of,
@@ -95,7 +96,8 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
     numbers = {SHARE: RARELY, "samples": samples, "every": every, "noise.attitude": radii[0], "noise.rate": radii[1]}
     if noise.torque:
         numbers |= {DEVIATION: noise.torque, "noise.torque": radius(noise.torque, SHARES[0])}
-    numbers |= {BESIDE: DEVIATIONS} if measures_noisy_field(loop.loop) else {}
+    if vectors := noisy_fields(loop.loop):
+        numbers |= {BESIDE: DEVIATIONS} | ({VECTORS: float(vectors)} if vectors > 1 else {})
     evidence = {
         "covariances": [[[float.hex(x) for x in row] for row in pair.tolist()] for pair in shapes],
         "deviations": [str(Fraction(x)) for x in deviations],

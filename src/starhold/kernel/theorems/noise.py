@@ -31,7 +31,8 @@ from ..regions import AT_REST, RATE, STATE, TURN, Radii
 from ..rules import Definite, Exceeds, Part
 from ..sentences import Statement, below
 
-SHARE, BESIDE = "share", "noise.beside"
+SHARE, BESIDE, VECTORS = "share", "noise.beside", "noise.beside.vectors"
+"""The probability of what is left out, and the deviations within which other noise is, of so many vectors a sample."""
 DEVIATION = "noise.torque.deviation"
 """That of a random torque about each axis (N m), new at each sample and held until the next."""
 CARRIED, CORRECTED = "errors carried", "errors corrected"
@@ -87,7 +88,9 @@ def within_radii(claim: Claim, motion: Held) -> Part[tuple[Statement, tuple[Radi
         missed += samples * tail(motion.random, numbers[DEVIATION])
         beside = f", a random torque from outside up to {below(motion.random)} N m"
     if BESIDE in numbers:
-        missed += samples * tail(numbers[BESIDE], Fraction(1))
+        vectors = numbers[VECTORS] if VECTORS in numbers else Fraction(1)
+        demand(vectors >= 1, "there is no other noise")
+        missed += vectors * samples * tail(numbers[BESIDE], Fraction(1))
         beside += f", other noise up to {below(numbers[BESIDE])} deviations"
     yield "share", Exceeds(share, missed)
     text = (

@@ -63,7 +63,7 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
 
 
 def bound(params: Params, envelope: Envelope) -> Push:
-    """The largest norm of the torque, across the strongest field of the orbit."""
+    """The largest norm of the torque, across the strongest field at the least height of the orbit."""
     return Push(norm(params.dipole) * magnetic_field.strongest(params.epoch, envelope.distance))
 
 

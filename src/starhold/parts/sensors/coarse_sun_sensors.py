@@ -25,7 +25,7 @@ from starhold.algebra.vector import (
 )
 from starhold.algebra.words import number_of
 from starhold.parts import as_built, sun
-from starhold.parts.contract import Card, NoMemory, Parameter
+from starhold.parts.contract import Card, Parameter
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out
@@ -118,9 +118,7 @@ def prepare(params: Params, period: float) -> Numbers:
     return Numbers(normals, *shares, sun.prepared(params.epoch, params.ephemeris), period, outage, axes, late)
 
 
-def remember(params: Numbers, state: Any) -> Any:
-    """The state at the start where the sensor is late."""
-    return as_built.awaited(NoMemory(), params.late, state, as_built.PLACE)
+remember = as_built.see_start
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:

@@ -11,7 +11,7 @@ from starhold.algebra.scalar import Scalar, both, less, maximum, opposite, sqrt,
 from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, unit
 from starhold.parts import as_built
 from starhold.parts.boresight import BORESIGHT, THIRD, field_cosine, unit_boresight
-from starhold.parts.contract import Card, NoMemory, Parameter
+from starhold.parts.contract import Card, Parameter
 from starhold.parts.orbit import BODIES
 from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out
 from starhold.parts.random import Dice
@@ -83,9 +83,7 @@ def prepare(params: Params, period: float) -> Numbers:
     )
 
 
-def remember(params: Numbers, state: Any) -> Any:
-    """The state at the start where the sensor is late."""
-    return as_built.awaited(NoMemory(), params.late, state, as_built.PLACE)
+remember = as_built.see_start
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:

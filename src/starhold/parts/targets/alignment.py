@@ -6,6 +6,8 @@ of the attitude are exact."""
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from itertools import pairwise, product
 from typing import NamedTuple
 
 from starhold.algebra.cosines import to_quaternion
@@ -60,49 +62,125 @@ def aligned(first: Moving, second: Moving, axes: Matrix, before: Quaternion) -> 
 
 class Turning(NamedTuple):
     """The largest rate (rad/s) and acceleration across it (rad/s2) of a direction, and how much of the rate and of the
-    acceleration is not known."""
+    acceleration is not known. sides: of both the parts along x and along y of `bounded`, where these are known."""
 
     rate: float
     acceleration: float
     off_rate: float = 0.0
     off_acceleration: float = 0.0
+    sides: tuple[float, float, float, float] | tuple[()] = ()
 
 
 ROOM = 1.0 + 1e-7
 """The margin for floats of bounds."""
+BANDS, SIDES = 64, 32
+"""Bands of the sky over a place, and sides of a craft's course, for which motions are bounded."""
 
 
 def bounded(first: Turning, second: Turning, sine: float) -> Motion:
-    """Bounds of the motion of `aligned`, with directions whose angle x has at least this sine.
+    """Bounds of the motion of `aligned`, with directions z and s whose angle has at least this sine d, and the cosine c.
 
-    With z' and s' of no more than n and S, and y = z x s over the sine d, the vector (w_z d, d') is no longer than n |cos x|
-    + S, and z.(z x s)' is w_x d. So w_z is no more than W = (n |cos x| + S)/d, and with the accelerations m and Q w_z' is no
-    more than W^2 + n^2/2 + (m |cos x| + Q + 2nS)/d, the rest no more than m + nW. What is not known is in these terms."""
+    With y = z x s/d and x = y x z the rates are w_x = -z'.y, w_y = z'.x and w_z = (s'.y + c w_x)/d. Their derivatives are
+    -z''.y + w_y w_z, z''.x - w_x w_z and s''.y/d + 2 S (w_x + c w_z/d) + w_x w_y - c/d z''.y + 2 c/d w_y w_z, where S is the
+    part of s' across y. What is not known is in these terms."""
     if not sine > 0.0:
         return UNLIMITED
     sine /= ROOM
-    cosine, (n, m, _, lost), (s, q, off, unknown) = math.sqrt(1.0 - sine * sine), first, second
-    about = (n * cosine + s) / sine
-    gained = about**2 + 0.5 * n**2 + (m * cosine + q + 2.0 * n * s) / sine
+    cosine, (n, m, _, lost, sides), (s, q, off, unknown, _) = math.sqrt(1.0 - sine * sine), first, second
+    aside, about, bent_aside, bent_about = sides or (n, n, m, m)
+    slope, both = cosine / sine, min(about * aside, 0.5 * n * n)
+    spun = slope * about + s / sine
+    swept = slope * both + s * aside / sine
+    gained = q / sine + 2.0 * s * (about + slope * spun) + both + slope * bent_about + 2.0 * slope * swept
+    tilted = min(math.hypot(bent_about + swept, bent_aside + spun * about), m + spun * n)
     more = 2.0 * (lost + unknown) / sine + 3.0 * off * (2.0 * (n + s) - off) / sine**2
-    return Motion(math.hypot(n, about), math.hypot(m + n * about, gained), off / sine, more)
+    return Motion(math.hypot(n, spun), math.hypot(tilted, gained), off / sine, more)
 
 
-def nadir(orbit: Orbit) -> Turning:
-    """How the direction to the centre of attraction moves: the velocity is known, and the acceleration towards it."""
-    return Turning(orbit.rate, orbit.acceleration, 0.0, orbit.force / orbit.nearest)
+def nadir(orbit: Orbit, least: float) -> Iterator[tuple[Turning, float]]:
+    """Yield bounds of how the direction z to the centre of attraction moves, with its least sine of the angle to a
+    direction s that is at least an angle from the orbit's plane, for cells of that angle b and of the one from z to s in
+    the plane, t: the velocity is known, and the acceleration towards the centre. Of z' and z'' in the plane the part
+    along x of `bounded` is cos b sin t/d, which is largest for the least b and the largest t, and that along y is sin
+    b/d, for the largest b and the least t."""
+    rate, bent, off = orbit.rate, orbit.acceleration, orbit.force / orbit.nearest
+    highs = [least + (0.5 * math.pi - least) * k / SIDES for k in range(SIDES + 1)]
+    turns = [0.5 * math.pi * k / SIDES for k in range(SIDES + 1)]
+
+    def away(b: float, t: float) -> float:
+        return math.sqrt(max(1.0 - (math.cos(b) * math.cos(t)) ** 2, 0.0))
+
+    for (low, high), (near, far) in product(pairwise(highs), pairwise(turns)):
+        sine = away(low, near)
+        aside = math.cos(low) * math.sin(far) / (away(low, far) or 1.0)
+        about = math.sin(high) / away(high, near)
+        yield Turning(rate, bent, 0.0, off, (rate * aside, rate * about, bent * aside + off, bent * about + off)), sine
 
 
-def line_of_sight(orbit: Orbit, gravity: float, distance: float, radius: float, turn: float) -> Turning:
-    """How the direction moves to a place that is at least so far from the craft (m), at most so far from the centre (m), and
-    moves as if about that (rad/s); gravity: the gravitational parameter that the target knows."""
-    if not distance > 0.0:
-        return Turning(math.inf, math.inf)
-    speed = orbit.speed + turn * radius
-    off = orbit.force + abs(gravity - orbit.gravity) / orbit.nearest**2
-    pull = orbit.gravity / orbit.nearest**2 + orbit.force + turn**2 * radius
-    # Of a speed v the part along the line and that across it have a product of v^2/2 at most.
-    return Turning(speed / distance, (pull + speed**2 / distance) / distance, 0.0, off / distance)
+class Seen(NamedTuple):
+    """A place is seen from a craft: how far it is at least (m), between which sines of its angle to the craft's
+    vertical, and the most of that to its own; the speed of the craft, its part along the vertical, and that of the place
+    (m/s); and the largest acceleration across the line (m/s2) with how much of it is not known. Speeds are at most so
+    large."""
+
+    distance: float
+    least: float
+    most: float
+    low: float
+    speed: float
+    rising: float
+    drift: float
+    pull: float
+    off: float
+
+    def turning(self) -> Turning:
+        """Bounds of the line's motion in any direction from the craft's course."""
+        fast = self.speed + self.drift
+        # The place moves along the ground, but for the flattening.
+        along = self.speed * self.most + self.rising + self.drift * min(self.low + 0.01, 1.0)
+        # Of a speed v the part along the line and that across it have a product of v^2/2 at most.
+        bent = self.pull + min(2.0 * along * fast, fast * fast) / self.distance
+        return Turning(fast / self.distance, bent / self.distance, 0.0, self.off / self.distance)
+
+    def sides(self) -> Iterator[tuple[Turning, float]]:
+        """Yield bounds of the line's motion, with the least sine of its angle to the orbit's normal, for directions between
+        two angles to the course, whose parts along the course and along the normal are those of x and y."""
+        (u, w, *_), D = (self.least, self.most), self.distance
+        for k in range(SIDES):
+            (ahead, aside), (less_ahead, most_aside) = (
+                (math.cos(a), math.sin(a)) for a in (0.5 * math.pi * j / SIDES for j in (k, k + 1))
+            )
+            sine = math.sqrt(1.0 - (w * most_aside) ** 2)
+            # Of an angle from 0 to a quarter turn, sine times cosine is largest in its middle.
+            skew = 0.5 if aside <= ahead and less_ahead <= most_aside else max(ahead * aside, less_ahead * most_aside)
+            shares = math.sqrt(1.0 - (u * less_ahead) ** 2), math.sqrt((1.0 - u * u) / (1.0 - (u * most_aside) ** 2))
+            across, about, beside, along = (
+                min(self.speed * share + self.rising, self.speed) + self.drift
+                for share in (*shares, w * w * skew / sine, w * ahead)
+            )
+            fast = (self.speed + self.drift) ** 2
+            bent, bent_aside, bent_about = (
+                (self.pull + min(2.0 * along * x, fast) / D) / D for x in (across, beside, about)
+            )
+            yield Turning(across / D, bent, 0.0, self.off / D, (beside / D, about / D, bent_aside, bent_about)), sine
+
+
+def lines_of_sight(orbit: Orbit, gravity: float, radius: float, lowest: float, turn: float) -> Iterator[Seen]:
+    """Yield bounds of the line to a place that is at most so far from the centre (m) and moves as if about that (rad/s), in
+    bands of the angle of the craft from the place's vertical, up to the lowest (rad); gravity: the gravitational parameter
+    that the target knows. With the same angle at the craft, or at the place, a higher one is farther."""
+    low, speed, force = orbit.nearest, orbit.speed, orbit.force
+    eccentricity = max(low * speed**2 / orbit.gravity - 1.0, 0.0) + 1e-6
+    rising = min(speed, eccentricity * math.sqrt(orbit.gravity / (low * (1.0 + eccentricity)))) if not force else speed
+    off = force + abs(gravity - orbit.gravity) / low**2
+    for k in range(BANDS):
+        least, most = (radius * math.sin(lowest * j / BANDS) / low for j in (k, k + 1))
+        distance = low * math.sqrt(max(1.0 - least * least, 0.0)) - radius * math.cos(lowest * k / BANDS)
+        pull = orbit.gravity / low**2 * most + force + turn**2 * radius
+        if not most < 1.0 or not distance > 0.0:
+            distance, most = 0.0, 1.0
+        low_by = math.sin(lowest * (k + 1) / BANDS)
+        yield Seen(distance, least, most, low_by, speed, rising, turn * radius, pull, off)
 
 
 def _slope(a: Moving, b: Moving) -> Scalar:

@@ -25,7 +25,7 @@ from starhold.parts.targets.alignment import (
     body_axes,
     bounded,
     geodetic,
-    line_of_sight,
+    lines_of_sight,
     opposite_of,
     orbiting,
 )
@@ -41,9 +41,8 @@ CARD = Card(
     ),
 )
 ROLE = "target"
-LEANING, BANDS = 0.0034, 64
-"""The largest angle (rad) of the vertical to the direction from the Earth's centre; bands of the sky for which its motion is
-bounded."""
+LEANING = 0.0034
+"""The largest angle (rad) of the vertical to the direction from the Earth's centre."""
 NEEDS = ("two-body",)
 ABOUT = "Earth"
 FOLLOWS = True
@@ -104,17 +103,14 @@ def motion(params: Params, orbit: Orbit) -> Motion:
     """Bounds between its jumps: those of the orbital frame, and of the line to the station, of which the lowest craft are
     nearest. It is no farther from the orbit's plane than the angle at the craft between station and centre."""
     place, _ = geodetic(params.latitude, params.longitude, params.height)
-    radius, low = norm(place), min(0.5 * math.pi - params.elevation + LEANING, 0.5 * math.pi)
+    lowest = min(0.5 * math.pi - params.elevation + LEANING, 0.5 * math.pi)
     normal = Turning(orbit.off_rate, orbit.off_acceleration, orbit.off_rate, orbit.off_acceleration)
     most: tuple[float, ...] = orbit.rate, orbit.acceleration, orbit.off_rate, orbit.off_acceleration
-    for k in range(BANDS):
-        # From so far from the zenith at least, and at most: the craft is farther and the angle larger where it is lower.
-        far, wide = (radius * math.sin(low * j / BANDS) / orbit.nearest for j in (k, k + 1))
-        if not wide < 1.0:
+    for seen in lines_of_sight(orbit, params.gravity, norm(place), lowest, SPIN):
+        if not seen.distance > 0.0:
             return UNLIMITED
-        distance = orbit.nearest * math.sqrt(1.0 - far * far) - radius * math.cos(low * k / BANDS)
-        seen = line_of_sight(orbit, params.gravity, distance, radius, SPIN)
-        most = tuple(map(max, most, bounded(seen, normal, math.sqrt(1.0 - wide * wide))))
+        for pair in seen.sides():
+            most = tuple(map(max, most, bounded(pair[0], normal, pair[1])))
     return Motion(*most[:4], jumps=True)
 
 

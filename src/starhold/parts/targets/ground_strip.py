@@ -26,7 +26,7 @@ from starhold.parts.targets.alignment import (
     body_axes,
     bounded,
     geodetic,
-    line_of_sight,
+    lines_of_sight,
     orbiting,
 )
 
@@ -155,9 +155,16 @@ def motion(params: Params, orbit: Orbit) -> Motion:
         return UNLIMITED
     off, across = orbit.nearest * math.sin(apart), orbit.nearest * math.cos(apart) - RADIUS
     # The ellipsoid's radius changes by its flattening at most as the direction turns.
-    seen = line_of_sight(orbit, params.gravity, orbit.nearest - RADIUS, RADIUS, 1.01 * strip.rate + SPIN)
-    moved = bounded(seen, Turning(SPIN, SPIN**2), max(across, 0.0) / math.hypot(across, off))
-    return moved._replace(until=until, jumps=params.begin > 0.0)
+    widest, most = math.acos(max(across, 0.0) / math.hypot(across, off)), Motion(0.0, 0.0)[:4]
+    for seen in lines_of_sight(orbit, params.gravity, RADIUS, 0.5 * math.pi, 1.01 * strip.rate + SPIN):
+        if not seen.distance > 0.0:
+            return UNLIMITED
+        # From the plane the line is no farther than the craft's vertical and its angle to this one together, or than the
+        # craft's distance from the plane tells.
+        away = min(widest, apart + math.asin(seen.most), math.asin(min(off / seen.distance, 1.0)))
+        sine = math.sin(0.5 * math.pi - away)
+        most = tuple(map(max, most, bounded(seen.turning(), Turning(SPIN, SPIN**2), sine)[:4]))
+    return Motion(*most[:4], until=until, jumps=params.begin > 0.0)
 
 
 def examples() -> list[Params]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import asin, sin
+from math import asin
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion
@@ -81,8 +81,10 @@ def motion(params: Params, orbit: Orbit) -> Motion:
     as it does in every year."""
     high = asin(min(1.0, abs(dot(orbit.normal, sun.sun(0.0, sun.prepared(params.epoch, params.ephemeris)).direction))))
     least = high - (sun.FASTEST + orbit.off_rate) * DAY
-    moved = bounded(nadir(orbit), Turning(sun.FASTEST, sun.QUICKENING), sin(max(least, 0.0)))
-    return moved._replace(until=DAY)
+    slow, most = Turning(sun.FASTEST, sun.QUICKENING), Motion(0.0, 0.0)[:4]
+    for down, sine in nadir(orbit, max(least, 0.0)):
+        most = tuple(map(max, most, bounded(down, slow, sine)[:4]))
+    return Motion(*most[:4], until=DAY)
 
 
 def examples() -> list[Params]:

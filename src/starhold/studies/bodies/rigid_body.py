@@ -8,19 +8,22 @@ from typing import TYPE_CHECKING, Any, final
 
 from starhold.algebra.quantity import Quantity
 from starhold.analysis.meter import recorded_of, says_valid
-from starhold.analysis.premise_notes import PREMISES, Masses
+from starhold.analysis.premise_notes import MODES, PREMISES, Masses
 from starhold.analysis.rigid_body import EXTRAS, METRICS, error_angle, make_meter, measure
 from starhold.analysis.transient import Limits, against_limits
 from starhold.laws.modes import mode_laws
+from starhold.loop.modes import loop_of_mode
 from starhold.parts.epoch import OF_DATE, iso_text
 from starhold.parts.part import same_numbers
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued
 from starhold.studies.modes import (
+    Stretch,
     begins_asked,
     certify_modes,
     first_fault,
+    flown_stretches,
     hand_overs,
     mode_departures,
     named_modes,
@@ -80,7 +83,8 @@ class RigidBodyStudy(BodyStudy):
     ) -> Meter:
         masses = None
         if PREMISES in extras:
-            masses = Masses(loop.craft.inertia, () if loop.wheels is None else loop.wheels.axes)
+            axes = () if loop.wheels is None else loop.wheels.axes
+            masses = Masses(loop.craft.inertia, axes, (0.0,) * len(MODES) if mode_laws(loop.law, loop.gains) else ())
         for extra in extras:
             if extra not in (*EXTRAS, PREMISES):
                 raise ValueError(f"{' or '.join(EXTRAS)}, not {extra}")
@@ -116,42 +120,48 @@ class RigidBodyStudy(BodyStudy):
     def departures(self, issued: Issued, loop: ClosedLoop, run: Recording) -> dict[str, tuple[Departure, ...]]:
         from starhold.analysis.departure import departures
 
-        time = float(run["time"][-1])
+        end = self.ends(issued, loop, float(run["time"][-1]))
         if issued.mode is not None:
-            begun = (event.step for event in loop.events if event.step * loop.period <= time)
-            return mode_departures(issued, run, min(begun, default=None))
-        return departures(issued.certificate, issued.loop, run, issued.step, self.ends(issued, loop, time))
+            return mode_departures(issued, run, end)
+        return departures(issued.certificate, issued.loop, run, issued.step, end)
 
-    def covered(self, issued: Issued, loop: ClosedLoop, run: Recording) -> tuple[float, float] | None:
+    def covered(self, issued: Issued, loop: ClosedLoop, run: Recording) -> tuple[tuple[float, float], ...]:
         from starhold.analysis.departure import covered
 
-        if issued.mode is not None:
-            return None
-        last = self.ends(issued, loop, float(run["time"][-1]))
-        return covered(issued.certificate, issued.loop, run, issued.step, last)
+        end = self.ends(issued, loop, float(run["time"][-1]))
+        flown = [Stretch(0, issued.step, end)] if issued.mode is None else flown_stretches(issued, run, end)
+        every = (covered(issued.certificate, issued.loop, run, one.first, one.last) for one in flown)
+        return tuple(between for between in every if between is not None)
 
     def ends(self, issued: Issued, loop: ClosedLoop, time: float) -> int | None:
         # A certificate ends where the loop changes next; the last of several events at one step decides.
         latest = {event.step: event for event in loop.events if event.step * loop.period <= time}
-        return min((step for step, event in latest.items() if _differs(event, issued)), default=None)
+        return min((step for step, event in latest.items() if _differs(event, issued, loop)), default=None)
 
     def start_inside(self, issued: Issued) -> dict[str, bool]:
-        return super().start_inside(issued) if issued.mode in (None, 1) and issued.before is None else {}
+        begins = issued.mode is None or (issued.mode == 1 and issued.before is None and not issued.step)
+        return super().start_inside(issued) if begins else {}
 
 
 STUDY = RigidBodyStudy()
 
 
-def _differs(event: Event, issued: Issued) -> bool:
+def _differs(event: Event, issued: Issued, flown: ClosedLoop) -> bool:
     """Return whether after an event the loop that flies, or the law's model of it, differs from the one a certificate is
     about."""
     if event.step != issued.step or issued.step:
         return event.step > issued.step
     # A fault at the very start, known to the law or not.
-    loop = issued.loop
-    pairs = zip(event.parts, loop.parts, strict=True)
-    same = same_numbers((event.craft, event.nominal, event.gains), (loop.craft, loop.craft, loop.gains))
+    loop, after = issued.loop, _after(event, flown)
+    after = after if issued.mode is None else loop_of_mode(after, issued.mode - 1)
+    pairs = zip(after.parts, loop.parts, strict=True)
+    same = same_numbers((event.craft, event.nominal, after.gains), (loop.craft, loop.craft, loop.gains))
     return not (same and all(same_numbers(one.params, other.params) for one, other in pairs))
+
+
+def _after(event: Event, loop: ClosedLoop) -> ClosedLoop:
+    """Return the loop that flies after an event."""
+    return replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
 
 
 def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing: bool = False) -> list[Issued]:
@@ -163,9 +173,13 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing:
     if mode_laws(loop.law, loop.gains):
         from starhold.studies.chain import widened
 
-        issued = certify_modes(loop, entry.name, wanted)
-        return widened(loop, entry.name, issued, wanted) if pointing else issued
-    return [Issued(certify(now, name, wanted), now, step) for name, now, step in _named(scenario, entry, loop)]
+        issued = list[Issued]()
+        for name, now, step in named_loops(scenario, entry, loop):
+            modes = certify_modes(now, name, wanted)
+            modes = widened(now, name, modes, wanted) if pointing else modes
+            issued += [one._replace(step=step) for one in modes]
+        return issued
+    return [Issued(certify(now, name, wanted), now, step) for name, now, step in named_loops(scenario, entry, loop)]
 
 
 def wanted_of(scenario: Scenario, pointing: bool) -> Wanted:
@@ -180,21 +194,26 @@ def wanted_of(scenario: Scenario, pointing: bool) -> Wanted:
 
 def certified_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> dict[str, ClosedLoop]:
     """Return the loops of the certificates of one law of the scenario, by name."""
-    if mode_laws(loop.law, loop.gains):
-        return named_modes(loop, entry.name) | {one.name: one.after for one in hand_overs(loop, entry.name)}
-    return {name: now for name, now, _ in _named(scenario, entry, loop)}
+    every = {name: now for name, now, _ in named_loops(scenario, entry, loop)}
+    if not mode_laws(loop.law, loop.gains):
+        return every
+    modes = [one for name, now in every.items() for one in named_modes(now, name).items()]
+    return dict(modes) | {one.name: one.after for name, now in every.items() for one in hand_overs(now, name)}
 
 
-def handed_over(entry: LawEntry, loop: ClosedLoop) -> dict[str, Ends]:
+def handed_over(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> dict[str, Ends]:
     """Return the rates (rad/s) and angles (rad) below which the switches of a law hand over, by the names of their
     certificates."""
     from starhold.certification.hand_over import ends
 
-    switches = hand_overs(loop, entry.name) if mode_laws(loop.law, loop.gains) else []
+    every = named_loops(scenario, entry, loop) if mode_laws(loop.law, loop.gains) else []
+    switches = [one for name, now, _ in every for one in hand_overs(now, name)]
     return {one.name: ends(one.levels, one.before, one.after) for one in switches}
 
 
-def _named(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[tuple[str, ClosedLoop, int]]:
+def named_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[tuple[str, ClosedLoop, int]]:
+    """Return the initial loop and each later loop that the law knows, with the begin of their certificates' names and the
+    control step from which they fly."""
     known = _known(loop, scenario.table.simulation.steps)
     return [(f"{entry.name} from {step * loop.period:g} s" if step else entry.name, now, step) for step, now in known]
 
@@ -202,14 +221,15 @@ def _named(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[tuple[
 def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
     """Return the initial loop and each later loop that the law knows, with the control step from which it flies."""
     known = [(0, replace(loop, events=()))]
-    if loop.remembers:
+    # A law that goes on with its memory does not begin anew; each mode does.
+    if loop.remembers and not mode_laws(loop.law, loop.gains):
         return known
     latest = {event.step: event for event in loop.events if event.step < steps}
     for step, event in latest.items():
         sound = all(tells(f.params) for f in event.parts if (tells := f.part.hook("gives_allocated_torque")) is not None)
         if not sound or event.nominal.inertia != event.craft.inertia:
             continue
-        now = replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
+        now = _after(event, loop)
         if step:
             # One more step, for the changes that come with the event.
             carry = fly(loop, step)[1]
