@@ -19,11 +19,15 @@ from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
 from starhold.certification.subject import make_subject
-<<<<<<< HEAD
-from starhold.certification.unmodelled import LARGER, Pushes, change_of_modelled, driven_errors, lates, samples_of
-=======
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, noisy_fields, samples_of
->>>>>>> main
+from starhold.certification.unmodelled import (
+    LARGER,
+    Pushes,
+    change_of_modelled,
+    driven_errors,
+    lates,
+    noisy_fields,
+    samples_of,
+)
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
