@@ -1,6 +1,6 @@
 """Random loops of which a pointing bound is proved, and flights that are steered against it: `python -m
 tests.certification.pointing_hunt SEED COUNT [TOLERANCE | KIND]` prints what came of each; KIND: "plans" for loops with
-the predictive law, "targets" for ones that move, "shaken" for random torques."""
+the predictive law, "targets" for ones that move, "shaken" for random torques, "late" for actuators that lag."""
 
 import json
 import math
@@ -77,9 +77,16 @@ def random_loop(random, kind=""):
     law = some("lyapunov", "wheel", "wheel") if wheels else some("lyapunov", "lyapunov", "pd", "matrix-pd", "lqr", "wheel")
     law = "mpc" if kind == "plans" else law
     lines += [*parts_of(random, some, size, numbers, orbit, wheels, k, w, period)]
+    if kind == "late":
+        lines[2:2] = (
+            [f"actuator_lag = {size(0.05, 3.0) * period:.6g}"]
+            if some(0, 1)
+            else [f"torque_rate_limit = {size(0.3, 30.0) * k * w:.6g}"]
+        )
     if kind == "shaken":
         lines += ["[[part]]", 'type = "random-torque"', f"deviation = {size(1e-5, 1e-3) * k:.6g}"]
     lines += ["[simulation]", f"duration = {100.0 * period!r}", f"control_period = {period!r}"]
+    lines += ["substeps = 64"] * (kind == "late")
     lines += ["[certify]", f"disturbance = {size(1e-6, 3e-2) * k:.6g}", "[[law]]", f'type = "{law}"']
     lines += [f'quaternion_sign = "{some("as_published", "shortest", "hysteresis")}"']
     if kind == "plans":
@@ -186,6 +193,8 @@ class Attack(Oracle):
         found = Fleet(
             self.true, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), self.lanes
         )
+        if "late.torque.mean" in n:
+            found.late = n["late.torque.kept"], n["late.torque.mean"], n["late.torque.begun"]
         found.growing = n.get("outside.per.rate", 0.0), n.get("error.per.rate", 0.0)
         found.around = Surroundings(
             [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
@@ -217,12 +226,17 @@ class Attack(Oracle):
             ways.append(A.T @ ways[-1])
         return [along(B.T @ way) for way in reversed(ways)]
 
+    def highest_start(self):
+        """V of the start set, beside which the torque that acts may be off by as much as is told."""
+        n = self.numbers
+        return n["level"] - n.get("late.torque.weight", 0.0) * n.get("late.torque.begun", 0.0) ** 2
+
     def worst(self):
         """What contradicts the claim, or "", and the largest angle and rate in the end as shares of the claimed ones."""
         n, h = self.numbers, self.numbers["period"]
         V0 = self.lyapunov(np.eye(4)[0], np.zeros(3))
         fleet, half = self.fleet(), self.lanes // 2
-        states = [self.border(V0, n["level"] * self.rng.uniform() * (k % 3 > 0)) for k in range(half)]
+        states = [self.border(V0, self.highest_start() * self.rng.uniform() * (k % 3 > 0)) for k in range(half)]
         begin = (np.concatenate([np.array(part).T, np.tile(rest[:, None], half)], axis=1) for part, rest in zip(
             zip(*states, strict=True), (np.eye(4)[0], np.zeros(3)), strict=True))  # fmt: skip
         near = np.arange(self.lanes) >= half
@@ -234,6 +248,8 @@ class Attack(Oracle):
             found[:, ::2] = extremal[k % len(extremal)][:, ::2]
             return found
 
+        # What begins on target has been there.
+        fleet.unsettled = np.where(near, 0.0, 1.0)
         fleet.push, found, reached = push, "", [0.0, 0.0, 0.0]
         begun = SETTLED / self.slow if "share" in n else 0.0
         for k, q, w in fleet.fly(*begin, periods):

@@ -19,14 +19,22 @@ from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
 from starhold.certification.subject import make_subject
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, noisy_fields, samples_of
+from starhold.certification.unmodelled import (
+    LARGER,
+    Pushes,
+    change_of_modelled,
+    driven_errors,
+    lates,
+    noisy_fields,
+    samples_of,
+)
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, TOLD_TORQUE, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.plans import PLANNED
 from starhold.kernel.theorems.noise import BESIDE, DEVIATION, VECTORS
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import DEVIATIONS
+from starhold.parts.contract import DEVIATIONS, Late
 from starhold.parts.effectors.wheel_motion import at_top_speed
 from starhold.parts.effectors.wheels import BAND, gives_allocated_torque
 
@@ -111,6 +119,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
             # Without both a torque may turn over at once.
             numbers = dict.fromkeys(CHANGE, Fraction(0)) | numbers
             pushed |= dict(zip(CHANGE, change_of_modelled(loop, envelope), strict=True))
+        yield from _late(numbers, lates(loop))
         yield from (f"{name} has no bound" for name, x in pushed.items() if not isfinite(x))
         least |= {name: exact(x) for name, x in pushed.items() if isfinite(x)}
         if "outside" in least and OUTSIDE not in claim["taken"]:
@@ -142,6 +151,22 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
             for name, x in most.items()
             if "." in name and name[0] in "ms" and isfinite(x) and name not in numbers
         )
+
+
+def _late(numbers: Mapping[Any, Fraction], lates_told: Mapping[str, Late]) -> Iterator[str]:
+    for kind in {name.split(".")[1] for name in numbers if name.startswith("late.")}:
+        if kind not in lates_told:
+            yield f"its {kind} is not late"
+            continue
+        late, claimed = lates_told[kind], {name: numbers.get(f"late.{kind}.{name}") for name in ("kept", "mean", "most")}
+        exact = {name: numbers.get(f"late.{kind}.{name}.least") for name in ("kept", "mean")}
+        for name in ("kept", "mean"):
+            x, least = getattr(late, name), exact[name]
+            off = least is not None and (not late.alike or least > fraction(x / LARGER))
+            if off or (claimed[name] or 0) < fraction(x):
+                yield f"its {kind} is late otherwise"
+        if isfinite(late.most) and (claimed["most"] is None or claimed["most"] > fraction(late.most)):
+            yield f"its {kind} is late otherwise where it is further off"
 
 
 def _planned(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:

@@ -234,6 +234,7 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds = [f"torques from outside {pushed('torque')}{' beside those that the law is told' * bool(n['told'])}{random}"]
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name] > 1e-12]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
+    bounds += [f"a lag of the torque, at first of up to {shown(n['late_torque'], ' N m')}"] if "late_torque" in n else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
     bounds[-1] += " of the inertia as given" * ("momentum" in n and "tolerance" in n)
     bounds += [OFF.format(shown(100.0 * n["tolerance"], " %"))] if "tolerance" in n else []
@@ -250,9 +251,8 @@ def _sampling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if n["longest"] is None:
         return text
     longest = shown(n["longest"], " s")
-    if n["every_shorter"]:
-        return f"{text} and for every period up to {longest}"
-    return f"{text} and for {longest} (periods between these are not shown)"
+    between = f"for {longest} (periods between these are not shown)"
+    return f"{text} and {f'for every period up to {longest}' if n['every_shorter'] else between}"
 
 
 def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:

@@ -1,14 +1,18 @@
-"""How far errors of what a law is told take its torque from the one at the true state. Docs/kernel.md, 10."""
+"""How far errors of what a law is told take its torque from the one at the true state, and how fast changes what is around.
+Docs/kernel.md, 10."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 
 from .loops import AttitudeLoop
 from .numbers import norm, root
 from .polynomials import Poly
-from .regions import ANGLE, Region, Sizes, as_told, felt, stretch
+from .regions import ANGLE, SPEED, Region, Sizes, as_told, felt, stretch
+
+ZERO = Fraction(0)
 
 
 class Reader:
@@ -23,6 +27,12 @@ class Reader:
     hurried: Fraction
     change: list[Fraction] | None
     unlike: list[Poly]
+    h: Fraction
+    off: Fraction
+
+    def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
+        """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
+        raise NotImplementedError
 
     @cached_property
     def wrong(self) -> Sizes:
@@ -39,7 +49,7 @@ class Reader:
         far from there and what errors that noise drives add linearly on target."""
         if not self.turned + self.rated + self.led + self.hurried:
             return Fraction(0), Fraction(0)
-        wrong, sizes = self.wrong, as_told(region.sizes, self.wrong)
+        wrong, sizes = self.wrong, as_told(self.lately(region.sizes), self.wrong)
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
         all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
@@ -48,9 +58,57 @@ class Reader:
         linear = {"q": turned / 2, "w": rated}
         curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
         less = [(full[k] - felt(self.unlike, k, near)) * x - full[k] * curved[k] for k, x in linear.items()]
-        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2)
+        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2 + self.delayed(region))
+
+    def delayed(self, region: Region) -> Fraction:
+        """Return how far q of an attitude that is told late is off."""
+        return late_in(region.sizes, "attitude")
+
+    def lately(self, sizes: Sizes) -> Sizes:
+        """Return the sizes of what a law would be told without errors but those of what comes late."""
+        turned, rated = (late_in(sizes, kind) for kind in ("attitude", "rate"))
+        turn = {"r": 2 * turned * self.size("r"), "a": 2 * turned * self.size("a")}
+        wrong = {"q": turned, "w": rated + turn["r"], "h": stretch(self.loop.given) * rated} | turn
+        return as_told(sizes, wrong) if turned or rated else sizes
 
     def size(self, letter: str) -> Fraction:
         """Return a bound of the norm of a vector from outside."""
         sizes = [x for name, x in self.others.items() if name[0] == letter]
         return norm(sizes) if letter == "e" else max(sizes, default=Fraction(0))
+
+    def load(self, sizes: Sizes, acceleration: Fraction) -> Fraction:
+        """Return how far the torque that the body takes is from that of the given inertia."""
+        w, r = sizes[SPEED], self.size("r")
+        return self.off * (acceleration + self.size("a") + w * r + (w + r) ** 2)
+
+    def changes(self, sizes: Sizes, turning: int = 1) -> dict[str, Fraction]:
+        """Return by how much target, momentum and torque from outside change in the mean of a period: those from nothing on;
+        the torque is at no time nearer than this to what the law is told. turning: 0 without what the body's own rate does
+        to momentum."""
+        e, r, a, H = (self.size(letter) for letter in "erah")
+        w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
+        turned = (turning * w + r) * H + e + outside
+        return {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * turned, "e": min(2 * e, self.gradual(sizes))}
+
+    def gradual(self, sizes: Sizes) -> Fraction:
+        """Return by how much a torque that is told changes in the mean of a period, or twice itself if it may at once."""
+        if self.change is None:
+            return 2 * self.size("e")
+        return self.h / 2 * (self.change[0] + self.change[1] * (sizes[SPEED] + self.size("r")))
+
+    def stale(self, sizes: Sizes, parts: list[Poly], turning: int = 1, letters: str = "raeh") -> Fraction:
+        """Return by how much parts change by that, or by some of it."""
+        changes = self.changes(sizes, turning)
+        return sum((felt(parts, letter, sizes) * changes[letter] for letter in letters), ZERO)
+
+    def unlike_body(self, sizes: Sizes, parts: Sequence[list[Poly]]) -> tuple[Fraction, Fraction]:
+        """Return `stale` of two parts, of which the second follows momentum that turns with the body as without pushes; and
+        what is more for each rate that pushes add until the end of a period."""
+        steady, turning = parts
+        calm = self.stale(sizes, steady) + self.stale(sizes, turning, 0)
+        return calm, felt(turning, "h", sizes) * self.h / 4 * self.size("h")
+
+
+def late_in(sizes: Sizes, kind: str) -> Fraction:
+    """Return how far off something is at most that is late."""
+    return sum((sizes.get(f"|late {kind}{rest}", Fraction(0)) for rest in ("", " rest")), Fraction(0))
