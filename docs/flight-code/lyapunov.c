@@ -32,13 +32,13 @@ typedef struct {
     quaternion_t attitude; /* unit quaternion, scalar first */
 } inertial_params_t;
 
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
+/* The numbers of a loop besides those of craft and law, an argument of kernels. */
 typedef struct {
     double limit;
     inertial_params_t target;
 } setup_t;
 
-/* The numbers that do not change in flight. */
+/* Constants of the flight code. */
 typedef struct {
     gains_t gains;
     craft_t craft;
@@ -46,15 +46,15 @@ typedef struct {
 } parameters_t;
 
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
-   the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
+   the torque of the actuators (body, N m), which has its own dynamics if the actuators lag. */
 typedef struct {
     quaternion_t attitude;
     vector_t rate;
     vector_t position;
 } state_t;
 
-/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
-   and acceleration (rad/s2), both in target axes. */
+/* The target attitude q_RN (inertial to target axes), and the target's angular velocity (rad/s) and
+   acceleration (rad/s2), both in target axes. */
 typedef struct {
     quaternion_t attitude;
 } goal_t;
@@ -65,10 +65,9 @@ typedef struct {
     double inverse_square;
 } attraction_result_t;
 
-/* All that a measurement is made of besides the state: the goal (None where the loop has no target),
-   whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
-   body), the control period, the limit of the command, and all readings of the sensors, an attribute for
-   each. */
+/* The inputs of a measurement besides the state: the goal (None without a target), whether it never turns,
+   the modelled external torque (N m, body), the effectors' momentum (N m s, body), the control period (s),
+   the limit of the command, and all readings of the sensors, one attribute each. */
 typedef struct {
     goal_t goal;
     vector_t torque;
@@ -79,7 +78,7 @@ typedef struct {
     quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
     vector_t rate; /* rad/s: angular velocity relative to the target */
     vector_t body_rate; /* rad/s: absolute angular velocity */
-    vector_t target_acceleration; /* rad/s^2: derivative of target_rate as the turning body sees it */
+    vector_t target_acceleration; /* rad/s^2: derivative of target_rate in the rotating body axes */
     vector_t external_torque; /* N m: modelled torque from outside at this attitude */
 } measurement_t;
 
@@ -103,7 +102,7 @@ static const parameters_t parameters = {
 
 /* -------------------------------- parts.targets.inertial -------------------------------- */
 
-/* The attitude, at rest. */
+/* Return the attitude, at rest. */
 static goal_t inertial_goal(const inertial_params_t *params)
 {
     return (goal_t){.attitude = params->attitude};
@@ -119,7 +118,7 @@ static double dot(vector_t a, vector_t b)
 
 /* ----------------------------- parts.environments.two_body ------------------------------ */
 
-/* mu/r3 and 1/r2, with one division. */
+/* Return mu/r^3 and 1/r^2, with one division. */
 static attraction_result_t attraction(vector_t position, const craft_t *craft)
 {
     const double inverse_square = 1.0 / dot(position, position);
@@ -167,7 +166,7 @@ static vector_t to_body(quaternion_t q, vector_t r)
 
 /* ------------------------------------- parts.craft -------------------------------------- */
 
-/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
+/* Return the inertia of the whole craft, on which gravity acts (kg m2). */
 static vector_t total_inertia(const craft_t *craft)
 {
     return craft->inertia;
@@ -183,13 +182,14 @@ static vector_t gyroscopic_torque(vector_t m, vector_t a)
 
 /* ------------------------- parts.environments.gravity_gradient -------------------------- */
 
-/* Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2)). */
+/* Return the gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r^5 (1/(m2
+   s2)). */
 static vector_t gravity_gradient(vector_t position, double strength, const craft_t *craft)
 {
     return scale(strength, gyroscopic_torque(total_inertia(craft), position));
 }
 
-/* Torque on the body (N m, body axes). */
+/* Return the torque on the body (N m, body axes). */
 static vector_t gravity_gradient_torque(const state_t *state, const craft_t *craft)
 {
     const attraction_result_t attraction_result = attraction(state->position, craft);
@@ -224,7 +224,7 @@ static quaternion_t relative(quaternion_t target, quaternion_t q)
 
 /* ------------------------------- parts.bodies.rigid_body -------------------------------- */
 
-/* The law's measurement of a state as sensors or estimators give it. */
+/* Return the law's measurement of a state from sensors or estimators. */
 static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
@@ -246,7 +246,7 @@ static vector_t times(vector_t a, vector_t b)
     return (vector_t){a.x * b.x, a.y * b.y, a.z * b.z};
 }
 
-/* Return the matrix-vector product; a vector in place of the matrix is a diagonal one. */
+/* Return the matrix-vector product; a vector in place of the matrix stands for a diagonal one. */
 static vector_t apply(vector_t m, vector_t a)
 {
     return times(m, a);

@@ -29,12 +29,12 @@ typedef struct {
     quaternion_t attitude; /* unit quaternion, scalar first */
 } inertial_params_t;
 
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
+/* The numbers of a loop besides those of craft and law, an argument of kernels. */
 typedef struct {
     inertial_params_t target;
 } setup_t;
 
-/* The numbers that do not change in flight. */
+/* Constants of the flight code. */
 typedef struct {
     gains_t gains;
     craft_t craft;
@@ -42,22 +42,21 @@ typedef struct {
 } parameters_t;
 
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
-   the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
+   the torque of the actuators (body, N m), which has its own dynamics if the actuators lag. */
 typedef struct {
     quaternion_t attitude;
     vector_t rate;
 } state_t;
 
-/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
-   and acceleration (rad/s2), both in target axes. */
+/* The target attitude q_RN (inertial to target axes), and the target's angular velocity (rad/s) and
+   acceleration (rad/s2), both in target axes. */
 typedef struct {
     quaternion_t attitude;
 } goal_t;
 
-/* All that a measurement is made of besides the state: the goal (None where the loop has no target),
-   whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
-   body), the control period, the limit of the command, and all readings of the sensors, an attribute for
-   each. */
+/* The inputs of a measurement besides the state: the goal (None without a target), whether it never turns,
+   the modelled external torque (N m, body), the effectors' momentum (N m s, body), the control period (s),
+   the limit of the command, and all readings of the sensors, one attribute each. */
 typedef struct {
     goal_t goal;
     vector_t torque;
@@ -69,7 +68,7 @@ typedef struct {
     quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
     vector_t rate; /* rad/s: angular velocity relative to the target */
     vector_t body_rate; /* rad/s: absolute angular velocity */
-    vector_t target_acceleration; /* rad/s^2: derivative of target_rate as the turning body sees it */
+    vector_t target_acceleration; /* rad/s^2: derivative of target_rate in the rotating body axes */
     vector_t external_torque; /* N m: modelled torque from outside at this attitude */
     vector_t wheel_momentum; /* N m s: angular momentum of the body's wheels */
 } measurement_t;
@@ -93,7 +92,7 @@ static const parameters_t parameters = {
 
 /* -------------------------------- parts.targets.inertial -------------------------------- */
 
-/* The attitude, at rest. */
+/* Return the attitude, at rest. */
 static goal_t inertial_goal(const inertial_params_t *params)
 {
     return (goal_t){.attitude = params->attitude};
@@ -152,7 +151,7 @@ static vector_t add(vector_t a, vector_t b)
 
 /* ------------------------------- parts.bodies.rigid_body -------------------------------- */
 
-/* The law's measurement of a state as sensors or estimators give it. */
+/* Return the law's measurement of a state from sensors or estimators. */
 static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
@@ -203,7 +202,7 @@ static vector_t times(vector_t a, vector_t b)
     return (vector_t){a.x * b.x, a.y * b.y, a.z * b.z};
 }
 
-/* Return the matrix-vector product; a vector in place of the matrix is a diagonal one. */
+/* Return the matrix-vector product; a vector in place of the matrix stands for a diagonal one. */
 static vector_t apply(vector_t m, vector_t a)
 {
     return times(m, a);
@@ -211,7 +210,7 @@ static vector_t apply(vector_t m, vector_t a)
 
 /* -------------------------------------- laws.modal -------------------------------------- */
 
-/* Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|2, if the momentum
+/* Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|^2 if the momentum
    were its input. */
 static vector_t upper(vector_t q, vector_t w, const gains_t *gains, const craft_t *craft, double first,
     vector_t rest)

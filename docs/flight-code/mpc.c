@@ -25,7 +25,7 @@ typedef struct {
 typedef struct {
     vector_t inertia; /* kg m^2: of a craft with wheels without their rotors' about their axes */
     vector_t inverse_inertia; /* 1/(kg m^2): its inverse */
-    /* N m: that a law may count on, per axis or in norm; infinite for none; with wheels at most what they give */
+    /* N m: available to a law, per axis or in norm; infinite for none; with wheels at most their torque */
     double torque_limit;
     double gravity; /* m^3/s^2: gravitational parameter of the body that it orbits */
 } craft_t;
@@ -35,37 +35,36 @@ typedef struct {
     quaternion_t attitude; /* unit quaternion, scalar first */
 } inertial_params_t;
 
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
+/* The numbers of a loop besides those of craft and law, an argument of kernels. */
 typedef struct {
     double period;
     double limit;
     inertial_params_t target;
 } setup_t;
 
-/* The numbers that do not change in flight. */
+/* Constants of the flight code. */
 typedef struct {
     craft_t craft;
     setup_t setup;
 } parameters_t;
 
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
-   the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
+   the torque of the actuators (body, N m), which has its own dynamics if the actuators lag. */
 typedef struct {
     quaternion_t attitude;
     vector_t rate;
     vector_t position;
 } state_t;
 
-/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
-   and acceleration (rad/s2), both in target axes. */
+/* The target attitude q_RN (inertial to target axes), and the target's angular velocity (rad/s) and
+   acceleration (rad/s2), both in target axes. */
 typedef struct {
     quaternion_t attitude;
 } goal_t;
 
-/* All that a measurement is made of besides the state: the goal (None where the loop has no target),
-   whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
-   body), the control period, the limit of the command, and all readings of the sensors, an attribute for
-   each. */
+/* The inputs of a measurement besides the state: the goal (None without a target), whether it never turns,
+   the modelled external torque (N m, body), the effectors' momentum (N m s, body), the control period (s),
+   the limit of the command, and all readings of the sensors, one attribute each. */
 typedef struct {
     goal_t goal;
     double period;
@@ -76,12 +75,12 @@ typedef struct {
     quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
     vector_t rate; /* rad/s: angular velocity relative to the target */
     vector_t body_rate; /* rad/s: absolute angular velocity */
-    vector_t target_acceleration; /* rad/s^2: derivative of target_rate as the turning body sees it */
+    vector_t target_acceleration; /* rad/s^2: derivative of target_rate in the rotating body axes */
     vector_t position; /* m: from the centre of attraction */
     double period; /* s: for which the torque will be held */
 } measurement_t;
 
-/* The motion is x' = A x + B u for x = (q; w), small about the measured motion, in blocks of three: A =
+/* The motion x' = A x + B u for small x = (q; w) about the measured motion, in blocks of three: A =
    [[turning, E/2], [stiffness, damping]], B = [0; push]. */
 typedef struct {
     matrix_t turning;
@@ -90,7 +89,7 @@ typedef struct {
     matrix_t push;
 } linear_t;
 
-/* The blocks are those of A of `Linear` over some time: [[turning, half E], [stiffness, damping]]. */
+/* The blocks of A of `Linear` times some time: [[turning, half E], [stiffness, damping]]. */
 typedef struct {
     matrix_t turning;
     double half;
@@ -112,8 +111,8 @@ typedef struct {
     double scalar1;
 } share_result_t;
 
-/* A move v keeps |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, which is low <= v
-   <= high. */
+/* Limits of a move v: |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, low <= v <=
+   high. */
 typedef struct {
     vector_t centre;
     double bound;
@@ -137,7 +136,7 @@ typedef struct {
     vectors6_t rows1;
 } motion_result_t;
 
-/* The weights are Q and R, full or as their diagonals, the inverse of R, and P. */
+/* The weights Q and R, full or as their diagonals, the inverse of R, and P. */
 typedef struct {
     doubles6_t q;
     vector_t r;
@@ -171,15 +170,15 @@ typedef struct {
     double scalar1;
 } sweep_result_t;
 
-/* A trial plan, with a flag for whether a limit cut a move, and the change of half the cost towards it,
-   slope + curvature / 2, which is free of the cancellation that a difference of two costs suffers. */
+/* A trial plan: whether a limit cut a move, and the change of half the cost, slope + curvature / 2, which
+   avoids the cancellation in a difference of two costs. */
 typedef struct {
     bool cut;
     double change;
 } trial_t;
 
-/* The progress of a run is half the cost of the plan, the sweeps so far, whether the interior-point method
-   has been used, whether the run is over, and the fields of `Solved` at that time. */
+/* Progress of a run: half the cost of the plan, the sweeps so far, whether the interior-point method has
+   been used, whether the run is over, and the fields of `Solved` so far. */
 typedef struct {
     double half;
     double sweeps;
@@ -189,13 +188,13 @@ typedef struct {
     bool shaped;
 } progress_t;
 
-/* The result of a Newton step, and whether the interior-point method is to be used. */
+/* Result of a Newton step, and whether the interior-point method is to be used. */
 typedef struct {
     progress_t progress;
     bool rescue;
 } attempt_t;
 
-/* The state of the method is the barrier's height, the sweeps so far, and whether the end is reached. */
+/* The state of the method: the barrier parameter, the sweeps so far, and whether it has ended. */
 typedef struct {
     double barrier;
     double sweeps;
@@ -208,7 +207,8 @@ typedef struct {
     double scalar1;
 } interior_result_t;
 
-/* A run gives the number of Riccati sweeps, whether the optimum was reached, and whether limits shape it. */
+/* Result of a run: the number of Riccati sweeps, whether the optimum was reached, and whether limits are
+   active. */
 typedef struct {
     double sweeps;
     bool solved;
@@ -254,7 +254,7 @@ enum {
 
 /* -------------------------------- parts.targets.inertial -------------------------------- */
 
-/* The attitude, at rest. */
+/* Return the attitude, at rest. */
 static goal_t inertial_goal(const inertial_params_t *params)
 {
     return (goal_t){.attitude = params->attitude};
@@ -308,7 +308,7 @@ static vector_t to_body(quaternion_t q, vector_t r)
 
 /* ------------------------------------- parts.craft -------------------------------------- */
 
-/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
+/* Return the inertia of the whole craft, on which gravity acts (kg m2). */
 static vector_t total_inertia(const craft_t *craft)
 {
     return craft->inertia;
@@ -349,7 +349,7 @@ static quaternion_t relative(quaternion_t target, quaternion_t q)
 
 /* ------------------------------- parts.bodies.rigid_body -------------------------------- */
 
-/* The law's measurement of a state as sensors or estimators give it. */
+/* Return the law's measurement of a state from sensors or estimators. */
 static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
@@ -372,7 +372,7 @@ static vector_t times(vector_t a, vector_t b)
     return (vector_t){a.x * b.x, a.y * b.y, a.z * b.z};
 }
 
-/* Return the matrix-vector product; a vector in place of the matrix is a diagonal one. */
+/* Return the matrix-vector product; a vector in place of the matrix stands for a diagonal one. */
 static vector_t apply(vector_t m, vector_t a)
 {
     return times(m, a);
@@ -380,8 +380,8 @@ static vector_t apply(vector_t m, vector_t a)
 
 /* ------------------------------------ laws.interface ------------------------------------ */
 
-/* The torque (N m) that makes the motion relative to a moving target obey the equations of a target at
-   rest, J w_e' + w_e x J w_e = rest of the torque; zero for a target at rest. */
+/* Return the torque (N m) under which the motion relative to a moving target obeys the equations for a
+   target at rest, J w_e' + w_e x J w_e = rest of the torque; zero for a target at rest. */
 static vector_t tracking_torque(const measurement_t *measurement, const craft_t *craft)
 {
     const vector_t gyroscopic = subtract(gyroscopic_torque(craft->inertia, measurement->body_rate),
@@ -406,7 +406,7 @@ static matrix_t transpose(matrix_t m)
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
 
-/* Return the motion near the measurement (SI units). */
+/* Return the motion linearised about the measurement (SI units). */
 static linear_t linearise(const measurement_t *measurement, const craft_t *craft)
 {
     const vector_t momentum = apply(craft->inertia, measurement->rate);
@@ -475,7 +475,8 @@ static double maximum(double a, double b)
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
 
-/* Return the share of the period, halved until no row's absolute sum passes 1, and how often that was. */
+/* Return the share of the period, halved until no row's absolute sum exceeds 1, and the number of
+   halvings. */
 static share_result_t share_1(const rates_t *rates)
 {
     const doubles6s6_t rows_result = rows(rates);
@@ -520,7 +521,7 @@ static share_result_t share_1(const rates_t *rates)
     return (share_result_t){.scalar = share_, .scalar1 = count_};
 }
 
-/* The rates act over that share of the time. */
+/* Return the rates times that share of the time. */
 static rates_t during(const rates_t *rates, double share)
 {
     return (rates_t){.turning = scaled(rates->turning, share), .half = rates->half * share,
@@ -566,7 +567,7 @@ static double dot2(doubles6_t a, doubles6_t b)
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
 
-/* Return the matrix times a column, without its zeros. */
+/* Return the matrix times a column, without multiplying its zero blocks. */
 static doubles6_t product(const rates_t *rates, doubles6_t x)
 {
     const doubles6s6_t rows_result = rows(rates);
@@ -588,7 +589,7 @@ static doubles6_t plus(doubles6_t a, doubles6_t b)
 
 /* ------------------------------------ algebra.scalar ------------------------------------ */
 
-/* Return the smaller; NaN in either argument is not hidden when it is the second. */
+/* Return the smaller number; a NaN in the second argument is returned. */
 static double minimum(double a, double b)
 {
     return a < b ? a : b;
@@ -596,7 +597,7 @@ static double minimum(double a, double b)
 
 /* -------------------------------- laws.predictive.motion -------------------------------- */
 
-/* Write the sum of A^k / (k + 1)! from k = 0 on to `mean`, column after column. */
+/* Write the sum of A^k / (k + 1)! from k = 0 on into `mean`, column by column. */
 static void sum_up(double *numbers, const rates_t *rates)
 {
     const doubles6s6_t transposed_result = transposed(rows(rates));
@@ -786,7 +787,7 @@ static vector_t times2(vector_t row, double c)
     return (vector_t){row.x * c, row.y * c, row.z * c};
 }
 
-/* Set A and B from S, back in the units of time. */
+/* Set A and B from S, converted back to seconds. */
 static void put_motion(double *numbers, const rates_t *rates, matrix_t push, double period)
 {
     const double t7 = numbers[MEAN_AT + 6];
@@ -955,7 +956,7 @@ static void put_limits(double *numbers, vector_t centre, double bound)
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
-/* Return the k-th three numbers of a buffer. */
+/* Return the k-th group of three numbers of a buffer. */
 static vector_t triple(double *numbers)
 {
     const vector_t vector = {numbers[LIMITS_AT], numbers[LIMITS_AT + 1], numbers[LIMITS_AT + 2]};
@@ -990,7 +991,7 @@ static project_result_t project(const limits_t *limits, vector_t v)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Shift a solved plan by one move; the tail's feedback gives the last one. */
+/* Shift a solved plan by one move; the feedback of the tail gives the last one. */
 static void advance(double *numbers)
 {
     const limits_t bounds = limits_1(numbers);
@@ -1038,7 +1039,7 @@ static void advance(double *numbers)
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
-/* A buffer holds a matrix row after row. */
+/* Return the matrix that a buffer holds row by row, of rows of `width`. */
 static doubles6s6_t matrix(double *numbers)
 {
     const doubles6_t doubles6 = {{numbers[MOTION_AT], numbers[MOTION_AT + 1], numbers[MOTION_AT + 2],
@@ -1056,7 +1057,7 @@ static doubles6s6_t matrix(double *numbers)
     return (doubles6s6_t){{doubles6, doubles6_2, doubles6_3, doubles6_4, doubles6_5, doubles6_6}};
 }
 
-/* A buffer holds a matrix row after row. */
+/* Return the matrix that a buffer holds row by row, of rows of `width`. */
 static vectors6_t matrix1(double *numbers)
 {
     const vector_t vector = {numbers[MOTION_AT + 36], numbers[MOTION_AT + 37], numbers[MOTION_AT + 38]};
@@ -1080,7 +1081,7 @@ static motion_result_t motion(double *numbers)
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
-/* A buffer holds a matrix row after row. */
+/* Return the matrix that a buffer holds row by row, of rows of `width`. */
 static doubles6s6_t matrix2(double *numbers)
 {
     const doubles6_t doubles6 = {{numbers[WEIGHTS_AT + 12], numbers[WEIGHTS_AT + 13],
@@ -1204,8 +1205,8 @@ static doubles6_t curvature_1(vector_t r, doubles6s3_t pushes, doubles6s3_t push
 
 /* -------------------------------- laws.predictive.limits -------------------------------- */
 
-/* Return (bound2 - d2)/2 for d = v - centre: on each axis of a box, or thrice that of a ball; positive
-   inside. */
+/* Return (bound^2 - d^2)/2 for d = v - centre on each axis of a box, or three times that of a ball;
+   positive inside. */
 static vector_t slack(const limits_t *limits, vector_t v)
 {
     const vector_t d = subtract(v, limits->centre);
@@ -1214,8 +1215,8 @@ static vector_t slack(const limits_t *limits, vector_t v)
         0.5 * (limits->bound - d.z) * (limits->bound + d.z)};
 }
 
-/* Return a symmetric matrix with the curvature of the limits added, and their push: the interior-point
-   step. */
+/* Return a symmetric matrix plus the curvature of the barrier, and the barrier's gradient: the
+   interior-point step. */
 static repelled_result_t repelled(const limits_t *limits, vector_t v, vector_t multipliers, double barrier,
     doubles6_t m)
 {
@@ -1260,7 +1261,7 @@ static doubles6_t box_inverse(doubles6_t m, bools3_t fixed)
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
-/* Return the inverse of m on the directions that no limit holds, and the number of limits that hold. */
+/* Return the inverse of m on the free directions, and the number of active limits. */
 static held_inverse_result_t held_inverse(const limits_t *bounds, vector_t v, vector_t g, doubles6_t m,
     bool holds)
 {
@@ -1327,7 +1328,7 @@ static double entry8(doubles6_t m)
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
-/* Keep the matrix symmetric against rounding, which long horizons would amplify. */
+/* Return the matrix made symmetric: long horizons would amplify the rounding. */
 static doubles6s6_t symmetric(doubles6s6_t m)
 {
     const double t2 = 0.5 * (m.e[1].e[0] + m.e[0].e[1]);
@@ -1350,7 +1351,7 @@ static doubles6s6_t symmetric(doubles6s6_t m)
         {{t8, t16, t22, t26, m.e[4].e[4], t30}}, {{t10, t18, t24, t28, t30, m.e[5].e[5]}}}};
 }
 
-/* Find the Newton step by one backward Riccati sweep, as a policy: step + feedback (x - x of the plan). */
+/* Compute the Newton step by one backward Riccati sweep, as a policy: step + feedback (x - x of the plan). */
 static sweep_result_t sweep(double *numbers, double barrier)
 {
     const motion_result_t motion_result = motion(numbers);
@@ -1648,7 +1649,7 @@ static double form2(doubles6s6_t m, doubles6_t x)
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
-/* Fly the policy of a sweep through the limits. */
+/* Simulate the policy of a sweep with the limits. */
 static trial_t follow(double *numbers, doubles6_t start)
 {
     const motion_result_t motion_result = motion(numbers);
@@ -1724,8 +1725,7 @@ static trial_t follow(double *numbers, doubles6_t start)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Fly the policy without limits through the limits, and tell whether they cut it: if not, it is the
-   optimum. */
+/* Simulate the unlimited policy with the limits; if they cut no move, it is the optimum. */
 static bool fly_freely(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {
@@ -1753,7 +1753,7 @@ static bool fly_freely(double *numbers)
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
-/* Find the states under the plan, and half its cost. */
+/* Compute the states under the plan; return half its cost. */
 static double rollout(double *numbers)
 {
     const motion_result_t motion_result = motion(numbers);
@@ -1809,7 +1809,7 @@ static vector_t weighed(vector_t r, vector_t v)
 
 /* -------------------------------- laws.predictive.limits -------------------------------- */
 
-/* Return the part of the gradient that no limit holds. */
+/* Return the part of the gradient along free directions. */
 static vector_t loose(const limits_t *limits, vector_t v, vector_t g)
 {
     const bools3_t fixed = pressing(limits, v, g);
@@ -1818,7 +1818,7 @@ static vector_t loose(const limits_t *limits, vector_t v, vector_t g)
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
-/* Return Q x + A'y, summed up together. */
+/* Return Q x + A'y, added term by term. */
 static doubles6_t costate(doubles6_t q, doubles6s6_t columns, doubles6_t x, doubles6_t y)
 {
     const double t6 = 0.0 + (entry3(q) * x.e[0] + columns.e[0].e[0] * y.e[0]) + columns.e[0].e[1] * y.e[1];
@@ -1845,7 +1845,8 @@ static doubles6_t costate(doubles6_t q, doubles6s6_t columns, doubles6_t x, doub
         t54 + columns.e[3].e[5] * y.e[5], t68 + columns.e[4].e[5] * y.e[5], total}};
 }
 
-/* Find the gradient of half the cost, and a bound on its gap to the optimum if the held limits are active. */
+/* Compute the gradient of half the cost; return a bound on its gap to the optimum, valid if the limits
+   that hold moves are the active ones. */
 static double adjoint(double *numbers)
 {
     const motion_result_t motion_result = motion(numbers);
@@ -1901,7 +1902,7 @@ static double adjoint(double *numbers)
     return 0.5 * gap_;
 }
 
-/* Turn the policy into a direction: step becomes the Newton step without limits. */
+/* Turn the policy into a direction: `step` becomes the Newton step without limits. */
 static void unroll(double *numbers)
 {
     const motion_result_t motion_result = motion(numbers);
@@ -1953,7 +1954,7 @@ static void unroll(double *numbers)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Search along the projection arc of the step (Armijo), halved `halvings` times at most, until the cost
+/* Search along the projection arc of the step (Armijo), halved at most `halvings` times, until the cost
    decreases enough. */
 static double shorten(double *numbers, double halvings)
 {
@@ -2027,8 +2028,8 @@ static double shorten(double *numbers, double halvings)
     return change_;
 }
 
-/* Make a trial plan along the Newton step without limits; gives the change of half the cost, zero where
-   none was found. */
+/* Make a trial plan along the Newton step without limits; return the change of half the cost, zero if
+   there is no decrease. */
 static double search(double *numbers)
 {
     unroll(numbers);
@@ -2041,7 +2042,7 @@ static bool is_zero(double x)
     return x <= 0.0 && 0.0 <= x;
 }
 
-/* Make a trial plan along the gradient, each move in its own scale: the projection guarantees descent for
+/* Make a trial plan along the gradient, with a scale for each move: the projection guarantees descent for
    short steps. */
 static double gradient_step(double *numbers)
 {
@@ -2060,7 +2061,7 @@ static double gradient_step(double *numbers)
 
 /* ------------------------------- laws.predictive.horizon -------------------------------- */
 
-/* Put the trial plan in the place of the plan. */
+/* Replace the plan by the trial plan. */
 static void take_over(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {
@@ -2151,7 +2152,7 @@ static void begin(double *numbers, double barrier)
     }
 }
 
-/* Return the share of the step that keeps slacks and multipliers positive; steps of the multipliers go to
+/* Return the share of the step that keeps slacks and multipliers positive; put the multipliers' steps into
    `trial`. */
 static double length_1(double *numbers, double barrier)
 {
@@ -2196,7 +2197,7 @@ static double length_1(double *numbers, double barrier)
     return length_;
 }
 
-/* Take the step at that length; gives the sum of slack times multiplier. */
+/* Take that share of the step; return the sum of slack times multiplier. */
 static double go(double *numbers, double length)
 {
     const limits_t bounds = limits_1(numbers);
@@ -2231,7 +2232,7 @@ static double go(double *numbers, double length)
     return gap_;
 }
 
-/* Take one step towards the optimum that the barrier allows, then lower the barrier. */
+/* Take one step towards the optimum for this barrier, then lower the barrier. */
 static turn_t turn_1(double *numbers, const turn_t *now, double count, double most)
 {
     adjoint(numbers);
@@ -2247,7 +2248,7 @@ static turn_t turn_1(double *numbers, const turn_t *now, double count, double mo
         .done = near || most <= sweeps};
 }
 
-/* Put moves near a limit on it. */
+/* Put moves that are near a limit on it. */
 static void settle(double *numbers)
 {
     const limits_t bounds = limits_1(numbers);
@@ -2283,9 +2284,9 @@ static double restore(double *numbers)
     return rollout_result;
 }
 
-/* Solve by the primal-dual interior-point method (Boyd and Vandenberghe 2004, section 11.7): it comes near
-   the optimum in a number of sweeps that hardly depends on the program, and then puts moves near a limit
-   on it. */
+/* Solve by the primal-dual interior-point method (Boyd and Vandenberghe 2004, section 11.7): it approaches
+   the optimum in a number of sweeps that hardly depends on the program, and then moves that are near a
+   limit are put on it. */
 static interior_result_t interior(double *numbers, double half, double most)
 {
     const double barrier_2 = 0.1 * half / 30.0;
@@ -2317,7 +2318,7 @@ static interior_result_t interior(double *numbers, double half, double most)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Take a Newton step, or the interior-point method where that does not serve. */
+/* Take a Newton step, or use the interior-point method where that fails. */
 static progress_t better(double *numbers, const progress_t *now)
 {
     const bool slow = 12.0 <= now->sweeps && !now->rescued;
@@ -2386,7 +2387,7 @@ static bool is_finite(double x)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Improve the plan until it is the optimum or the sweeps are used up. */
+/* Improve the plan until it is optimal or the sweeps are used up. */
 static solved_t descend(double *numbers, double sweeps)
 {
     const double rollout_result = rollout(numbers);
@@ -2417,7 +2418,7 @@ static solved_t descend(double *numbers, double sweeps)
     return (solved_t){.sweeps = sweeps1_, .solved = solved_, .shaped = shaped_ && is_finite(half_)};
 }
 
-/* Solve the program from the first of its states, starting with its plan if warm; the plan is overwritten. */
+/* Solve the program from its first state, starting from its plan if `warm`; the plan is overwritten. */
 static solved_t improve(double *numbers, bool warm)
 {
     double sweeps_ = 0.0;
@@ -2457,7 +2458,7 @@ static void count_1(double *numbers, const solved_t *end)
 
 /* -------------------------------- laws.predictive.sixes --------------------------------- */
 
-/* Return the k-th three numbers of a buffer. */
+/* Return the k-th group of three numbers of a buffer. */
 static vector_t triple1(double *numbers)
 {
     const vector_t vector = {numbers[PLAN_AT], numbers[PLAN_AT + 1], numbers[PLAN_AT + 2]};
@@ -2482,7 +2483,7 @@ static vector_t clip_axes(vector_t a, double limit)
 
 /* --------------------------------------- laws.mpc --------------------------------------- */
 
-/* Return the control torque (N m, body): the first move of the best plan. */
+/* Return the control torque (N m, body axes), the first move of the optimal plan. */
 static vector_t mpc_torque(double *numbers, const measurement_t *measurement, const craft_t *craft)
 {
     const vector_t ahead = tracking_torque(measurement, craft);

@@ -6,7 +6,7 @@
    Made by starhold 0.3.0 from the scenario three-laws, law mpc.
    Source: published comparison of Lyapunov, sliding-mode and predictive attitude control
    Assumes: rigid body; inertia known; no external torque but the gravity gradient; small attitude error,
-   or a horizon short against the turn.
+   or a horizon short compared with the slew.
 
    Command limit: 0.01 N m on each axis. Quaternion sign: as published.
    Fixed in this code: horizon = 10, terminal = riccati, limit = axis, budget = 50.
@@ -16,7 +16,7 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 82347490a938b62376e84f7f066efbee2ebc95888d463387741c95edcd18e30e:
+   Certificate: certificate.json, sha256 e915b18445ee4483c54af52e21f7117d4e8555adfa7a84eacdc51d28ee8415a9:
    proved
    Claims:
      proved: pointing as it flies: within 0.007201° of the target after 638 s at all times, from rest at up

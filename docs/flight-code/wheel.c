@@ -22,10 +22,10 @@ typedef struct {
     vector_t row[3];
 } matrix_t;
 
-/* The gains are damping, stiffness, and the share of the modelled torque that is compensated. */
+/* Damping, stiffness, and the share of the modelled torque that is compensated. */
 typedef struct {
     double k_rate; /* N m s: damping */
-    vector_t k_attitude; /* N m: weights of 1 - a_ii, one for all or one each */
+    vector_t k_attitude; /* N m: weights of 1 - a_ii: one, or one per axis */
     double compensation; /* share of the gyroscopic, target and external torque compensated */
 } gains_t;
 
@@ -52,12 +52,12 @@ typedef struct {
     wheels_t wheels;
 } effectors_t;
 
-/* The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. */
+/* The numbers of a loop besides those of craft and law, an argument of kernels. */
 typedef struct {
     effectors_t effectors;
 } setup_t;
 
-/* The numbers that do not change in flight. */
+/* Constants of the flight code. */
 typedef struct {
     gains_t gains;
     craft_t craft;
@@ -65,7 +65,7 @@ typedef struct {
 } parameters_t;
 
 /* Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and
-   the torque the actuators give (body, N m), which has dynamics of its own when the actuators lag. */
+   the torque of the actuators (body, N m), which has its own dynamics if the actuators lag. */
 typedef struct {
     quaternion_t attitude;
     vector_t rate;
@@ -73,8 +73,8 @@ typedef struct {
     vector_t velocity;
 } state_t;
 
-/* The attitude to be reached: q_RN (inertial to target axes), and the target's angular velocity (rad/s)
-   and acceleration (rad/s2), both in target axes. */
+/* The target attitude q_RN (inertial to target axes), and the target's angular velocity (rad/s) and
+   acceleration (rad/s2), both in target axes. */
 typedef struct {
     quaternion_t attitude;
     vector_t rate;
@@ -87,10 +87,9 @@ typedef struct {
     double inverse_square;
 } attraction_result_t;
 
-/* All that a measurement is made of besides the state: the goal (None where the loop has no target),
-   whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
-   body), the control period, the limit of the command, and all readings of the sensors, an attribute for
-   each. */
+/* The inputs of a measurement besides the state: the goal (None without a target), whether it never turns,
+   the modelled external torque (N m, body), the effectors' momentum (N m s, body), the control period (s),
+   the limit of the command, and all readings of the sensors, one attribute each. */
 typedef struct {
     goal_t goal;
     vector_t torque;
@@ -102,7 +101,7 @@ typedef struct {
     quaternion_t attitude; /* rotation from the target axes to the body axes, scalar first */
     vector_t rate; /* rad/s: angular velocity relative to the target */
     vector_t body_rate; /* rad/s: absolute angular velocity */
-    vector_t target_acceleration; /* rad/s^2: derivative of target_rate as the turning body sees it */
+    vector_t target_acceleration; /* rad/s^2: derivative of target_rate in the rotating body axes */
     vector_t external_torque; /* N m: modelled torque from outside at this attitude */
     vector_t wheel_momentum; /* N m s: angular momentum of the body's wheels */
 } measurement_t;
@@ -201,7 +200,7 @@ static quaternion_t to_quaternion(matrix_t a)
 
 /* ------------------------------------ algebra.scalar ------------------------------------ */
 
-/* Return -1 for negative x, else +1: the sign that never vanishes. */
+/* Return -1 for negative x, else +1: a sign that is never zero. */
 static double side(double x)
 {
     return x < 0.0 ? -1.0 : 1.0;
@@ -217,7 +216,7 @@ static quaternion_t nearer(quaternion_t q, quaternion_t other)
 
 /* -------------------------------- parts.targets.orbital --------------------------------- */
 
-/* The frame at this position and velocity. */
+/* Return the frame at this position and velocity. */
 static goal_t orbital_goal(const state_t *state, quaternion_t before)
 {
     const vector_t h = cross(state->position, state->velocity);
@@ -235,7 +234,7 @@ static goal_t orbital_goal(const state_t *state, quaternion_t before)
 
 /* ----------------------------- parts.environments.two_body ------------------------------ */
 
-/* mu/r3 and 1/r2, with one division. */
+/* Return mu/r^3 and 1/r^2, with one division. */
 static attraction_result_t attraction(vector_t position, const craft_t *craft)
 {
     const double inverse_square = 1.0 / dot(position, position);
@@ -271,7 +270,7 @@ static vector_t to_body(quaternion_t q, vector_t r)
 
 /* ------------------------------------- parts.craft -------------------------------------- */
 
-/* The inertia with all that is in the craft, which gravity acts on (kg m2). */
+/* Return the inertia of the whole craft, on which gravity acts (kg m2). */
 static vector_t total_inertia(const craft_t *craft)
 {
     return craft->with_rotors;
@@ -287,13 +286,14 @@ static vector_t gyroscopic_torque(vector_t m, vector_t a)
 
 /* ------------------------- parts.environments.gravity_gradient -------------------------- */
 
-/* Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2)). */
+/* Return the gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r^5 (1/(m2
+   s2)). */
 static vector_t gravity_gradient(vector_t position, double strength, const craft_t *craft)
 {
     return scale(strength, gyroscopic_torque(total_inertia(craft), position));
 }
 
-/* Torque on the body (N m, body axes). */
+/* Return the torque on the body (N m, body axes). */
 static vector_t gravity_gradient_torque(const state_t *state, const craft_t *craft)
 {
     const attraction_result_t attraction_result = attraction(state->position, craft);
@@ -303,7 +303,7 @@ static vector_t gravity_gradient_torque(const state_t *state, const craft_t *cra
 
 /* ----------------------------------- algebra.several ------------------------------------ */
 
-/* Return the sum of weights[i] * vectors[i], from the first to the last; there is at least one. */
+/* Return the sum of weights[i] * vectors[i], added from the first to the last; there is at least one. */
 static vector_t weighted(doubles4_t weights, vectors4_t vectors)
 {
     const double t11 = weights.e[0] * vectors.e[0].x + weights.e[1] * vectors.e[1].x + weights.e[2] *
@@ -320,13 +320,13 @@ static vector_t weighted(doubles4_t weights, vectors4_t vectors)
 
 /* -------------------------------- parts.effectors.wheels -------------------------------- */
 
-/* The wheels' momentum in body axes (N m s): sum a_i h_i. */
+/* Return the wheels' momentum in body axes (N m s): sum a_i h_i. */
 static vector_t wheel_momentum(doubles4_t momentum, const wheels_t *wheels)
 {
     return weighted(momentum, wheels->axes);
 }
 
-/* This momentum as tachometers and the known axes tell it. */
+/* Return this momentum as measured by tachometers, with the assumed axes (N m s). */
 static vector_t measured_momentum(const wheels_state_t *state, const wheels_t *params)
 {
     return wheel_momentum(state->momentum, params);
@@ -367,7 +367,7 @@ static vector_t subtract(vector_t a, vector_t b)
 
 /* ------------------------------- parts.bodies.rigid_body -------------------------------- */
 
-/* The law's measurement of a state as sensors or estimators give it. */
+/* Return the law's measurement of a state from sensors or estimators. */
 static measurement_t observe(const state_t *state, const scene_t *scene)
 {
     const quaternion_t error = relative(scene->goal.attitude, state->attitude);
@@ -396,7 +396,7 @@ static vector_t times(vector_t a, vector_t b)
     return (vector_t){a.x * b.x, a.y * b.y, a.z * b.z};
 }
 
-/* Return the matrix-vector product; a vector in place of the matrix is a diagonal one. */
+/* Return the matrix-vector product; a vector in place of the matrix stands for a diagonal one. */
 static vector_t apply(vector_t m, vector_t a)
 {
     return times(m, a);
@@ -404,7 +404,7 @@ static vector_t apply(vector_t m, vector_t a)
 
 /* -------------------------------------- laws.wheel -------------------------------------- */
 
-/* Return the torque demanded of the wheels (N m, body). */
+/* Return the torque demanded of the wheels (N m, body axes). */
 static vector_t wheel_torque(const measurement_t *measurement, const gains_t *gains, const craft_t *craft)
 {
     const vector_t q = vector_part(measurement->attitude);

@@ -62,8 +62,7 @@ typedef struct {
     double e[4];
 } wheel_doubles4_t;
 
-/* The absolute momentum of each rotor about its axis (N m s), and the angles (turns) of rotors out of
-   balance. */
+/* The absolute momentum of each rotor about its axis (N m s), and the angles (turns) of unbalanced rotors. */
 typedef struct {
     wheel_doubles4_t momentum;
 } wheel_wheels_state_t;
@@ -73,7 +72,7 @@ typedef struct {
     wheel_vector_t rate; /* rad/s: angular velocity, body axes */
     wheel_vector_t position; /* m: from the centre of attraction, inertial axes */
     wheel_vector_t velocity; /* m/s: inertial axes */
-    wheel_wheels_state_t wheels; /* as their tachometers tell */
+    wheel_wheels_state_t wheels; /* as their tachometers measure */
 } wheel_input_t;
 
 typedef struct {

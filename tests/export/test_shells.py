@@ -121,5 +121,5 @@ def test_shells_of_a_law_that_reads_the_time():
         names = re.findall(r'<Float64 name="([^"]+)"', archive.read("modelDescription.xml").decode())
     assert len(names) == len(set(names))
     assert {"time", "time_since_start"} < set(names)
-    with pytest.raises(InputError, match="found the input time; allowed: inputs that messages tell of"):
+    with pytest.raises(InputError, match="found the input time; allowed: inputs that messages contain"):
         shell_files(code, ["basilisk"])

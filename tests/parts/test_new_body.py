@@ -266,7 +266,11 @@ def test_each_loop_keeps_the_body_that_it_was_read_with(folder: Path) -> None:
     ("old", "new", "check"),
     [
         ("", "", None),
-        ("-gains.k, measurement", "-gains.k / dot(measurement.position, measurement.position), measurement", "Finite"),
+        (
+            "-gains.k, measurement",
+            "-gains.k / dot(measurement.position, measurement.position), measurement",
+            "The command is finite",
+        ),
         ("[Gains(1.0, 0.5), ", "[Gains(-1.0, 0.5), ", "Gains written"),
         ("    return add(scale(-gains.k", "    COUNT[0] += 1.0\n    return add(scale(COUNT[0]", "The command depends"),
     ],

@@ -343,7 +343,7 @@ def test_what_else_is_asked_has_its_table(served: Served) -> None:
     assert "root sum square" in shown("budget", "cubesat-nadir")
     page = shown("design", "wheels-orbital")
     assert "scaled stiffness K_a: 0.926" in page
-    assert "weights of 1 - a_ii, one for all or one each" in page
+    assert "weights of 1 - a_ii: one, or one per axis" in page
     assert "lyapunov-c.zip" in shown("export", "three-laws")
     text = flown.text().replace("runs = 500", "runs = 8")
     _, job = served.ask("POST", "/jobs", {"kind": "campaign", "text": text})

@@ -1,4 +1,4 @@
-"""Scalars, 3-vectors, quaternions and direction cosines are written once here, for every kind of number.
+"""Scalars, 3-vectors, quaternions and direction cosines, each defined once for every kind of number.
 
-Start with `scalar`: it says what an equation may use. The other modules are plain functions over tuples.
+Start with `scalar`: it lists what an equation may use. The other modules are plain functions of tuples.
 """

@@ -9,21 +9,21 @@ from starhold.algebra.dual import Dual
 from starhold.algebra.scalar import Scalar, absolute, less, side, where
 
 SHIFT = 1.5 * 2.0**52
-"""Adding this to a number rounds it: doubles of this size are whole."""
+"""Adding this constant rounds a number: doubles of this size are integers."""
 COSINE = tuple(float(Fraction((-1) ** n, factorial(2 * n))) for n in range(9))
 _SINE = tuple(float(Fraction((-1) ** n, factorial(2 * n + 1))) for n in range(8))
-"""Coefficients of the series, cut where the remainder is below 2^-54 up to an eighth of a turn."""
+"""Taylor coefficients, truncated so that the remainder is below 2^-54 up to an eighth of a turn."""
 
 
 def nearest(x: Scalar) -> Scalar:
-    """Return the whole number nearest to x, the even one of two; |x| is below 2^51."""
-    # Rounding has no slope, though the sum that does it has one.
+    """Return the integer nearest to x, ties to even, for |x| < 2^51."""
+    # Rounding has zero slope, although the sum that performs it has slope one.
     x = x.value if isinstance(x, Dual) else x
     return (x + SHIFT) - SHIFT
 
 
 def cosine_sine(turns: Scalar) -> tuple[Scalar, Scalar]:
-    """Return cosine and sine of an angle in turns, below 2^49 of them, with errors below 3e-16 for the angle as given."""
+    """Return cosine and sine of an angle in turns, below 2^49 turns in size, with errors below 3e-16."""
     quarters = 4.0 * (turns - nearest(turns))
     whole = nearest(quarters)
     angle = (0.25 * tau) * (quarters - whole)
@@ -32,8 +32,8 @@ def cosine_sine(turns: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def quartered(whole: Scalar, cosine: Scalar, sine: Scalar) -> tuple[Scalar, Scalar]:
-    """Return cosine and sine of an angle plus `whole` quarter turns, from -2 to 2, from those of the angle."""
-    # Two quarters turn both signs, one exchanges cosine and sine.
+    """Return cosine and sine of an angle plus `whole` quarter turns, from -2 to 2, given cosine and sine of the angle."""
+    # Two quarter turns change both signs; one exchanges cosine and sine.
     size, sense = absolute(whole), side(whole)
     odd, half = less(absolute(size - 1.0), 0.5), less(1.5, size)
     turned = where(half, -1.0, 1.0)

@@ -46,7 +46,7 @@ def _choose(condition: bool, a: Quaternion, b: Quaternion) -> Quaternion:
 def to_quaternion(a: Matrix) -> Quaternion:
     """Return the quaternion of a rotation matrix, from the largest of its four squared components (Shepperd's method).
 
-    Accurate at every attitude, 180 degrees included; of q and -q it returns the one whose largest component is positive."""
+    Accurate at every attitude, 180 degrees included. The largest component of the result is positive."""
     trace = a[0][0] + a[1][1] + a[2][2]
     x, y, z = a[1][2] - a[2][1], a[2][0] - a[0][2], a[0][1] - a[1][0]
     xy, yz, zx = a[0][1] + a[1][0], a[1][2] + a[2][1], a[2][0] + a[0][2]

@@ -1,5 +1,4 @@
-"""A dual number is a value and its slopes: equations that are called with such numbers are differentiated, exactly but for
-rounding."""
+"""Dual numbers, values with their derivatives: an equation called with them is differentiated, exactly but for rounding."""
 
 from __future__ import annotations
 
@@ -16,20 +15,20 @@ from starhold.algebra.operations import Operation
 TOWARD: ContextVar[NDArray[np.float64] | None] = ContextVar("toward", default=None)
 """Direction (n,) of the one-sided derivative where an equation switches branches at this very point."""
 DIRECTIONS = 4
-"""Directions, each with its opposite, in which branches must agree."""
+"""Number of directions, each taken with its opposite, in which branches must agree."""
 AGREED = 1e-9
 
 
 class BorderError(ArithmeticError):
-    """An equation has no slope here: the branches that meet disagree, or it reads a number's bits."""
+    """An equation has no derivative here: the branches that meet have different slopes, or it reads a number's bits."""
 
 
 class _UndecidedError(ArithmeticError):
-    """Equal numbers are compared, and there is no direction in which one becomes the larger."""
+    """Equal numbers are compared, and no direction says which of them becomes the larger."""
 
 
 class Dual:
-    """A value, and its derivatives (n,) by n variables."""
+    """A value and its derivatives (n,) with respect to n variables."""
 
     __slots__ = ("slopes", "value")
     reader: ClassVar[str] = "itself"
@@ -93,21 +92,21 @@ class Dual:
             return entry.plain(a, b)
         if "symbolic" not in entry.meanings or entry.takes[0] != "number":
             raise BorderError(f"{entry.name} has no derivative")
-        # The remaining operations are those of arithmetic, which duals define themselves.
+        # The remaining operations are arithmetic, which duals define themselves.
         return entry.meanings["symbolic"](*values)
 
 
 def variables(values: Sequence[float], first: int, count: int) -> list[Dual]:
-    """Return duals of these values, which are the variables `first`, `first + 1`, ... of `count`."""
+    """Return these values as duals, which are the variables `first`, `first + 1`, ... of `count`."""
     return [Dual(float(value), np.eye(1, count, first + k)[0]) for k, value in enumerate(values)]
 
 
 def differentiate(equation: Callable[[], Sequence[Any]], count: int) -> NDArray[np.float64]:
-    """Return the derivatives (numbers, count) of an equation's numbers by its `count` variables.
+    """Return the derivatives (results, count) of an equation's results with respect to its `count` variables.
 
-    Where it compares equal numbers, as a limit on a length does at zero, it is evaluated again in DIRECTIONS directions
-    and their opposites. BorderError where values or slopes differ between them, or there is no slope. No other
-    directions are tried."""
+    Where it compares equal numbers, as a limit on a length does at zero, it is evaluated again in DIRECTIONS directions and
+    their opposites. Raise BorderError where values or slopes differ between them, or there is no slope. No other directions
+    are tried."""
     try:
         return _agreed([_table(equation(), count)])
     except _UndecidedError:

@@ -45,7 +45,7 @@ def _pair(number: Fraction) -> tuple[float, float]:
 
 
 def _shares(count: int, bits: int, number: Fraction) -> tuple[float, ...]:
-    """Split a number into `count` floats that add up to it, each of `bits` bits but for the last."""
+    """Split a number into `count` floats whose sum it is, each of `bits` bits except the last."""
     shares: list[float] = []
     for place in range(1, count):
         scale = 1 << bits * place
@@ -67,7 +67,7 @@ _FIFTHS = tuple(1.0 / (2 * n + 1) for n in range(2, 13))
 
 
 def _power_of_two(exponent: Scalar) -> Scalar:
-    """Return 2 to a whole number from -1022 to 1023."""
+    """Return 2^exponent for an integer exponent from -1022 to 1023."""
     # The exponent of a double stands above its fraction of 52 bits.
     return with_bits(rotate_left(whole_word(exponent + 1023.0), 52))
 
@@ -79,7 +79,7 @@ def _scaled(x: Scalar, exponent: Scalar) -> Scalar:
 
 
 def _binary(x: Scalar) -> tuple[Scalar, Scalar]:
-    """Return e and m with x = 2^e m and 1 <= m < 2, of a positive number."""
+    """Return e and m with x = 2^e m and 1 <= m < 2, for positive x."""
     small = less(x, _SMALL)
     bits = bits_of(where(small, x * 2.0**54, x))
     exponent = number_in(shift_right(bits, 52)) - where(small, 1077.0, 1023.0)
@@ -92,12 +92,12 @@ def _inside(x: Scalar) -> Truth:
 
 
 def _is_negative(x: Scalar) -> Truth:
-    """Tell whether the sign is a minus, of zero too."""
+    """Tell whether the sign bit is set, for zero too."""
     return lowest_bit(shift_right(bits_of(x), 63))
 
 
 def _split(x: Scalar, low: Scalar | None = None) -> tuple[Scalar, Scalar]:
-    """Return a whole number k, and the rest of x (and of `low`, which is added) beside k times the logarithm of 2."""
+    """Return an integer k and the remainder x + low - k log 2."""
     power = nearest(x * float(1 / _LOGARITHM))
     less_of_it = power * _LOW
     return power, (x - power * _HIGH) - (less_of_it if low is None else less_of_it - low)
@@ -187,13 +187,13 @@ def cbrt(x: Scalar) -> Scalar:
     inside = _inside(size)
     exponent, m = _binary(where(inside, size, 1.0))
     third = nearest(exponent / 3.0)
-    # From 1/2 to 4.
+    # The scaled argument lies between 1/2 and 4.
     a = m * _power_of_two(exponent - 3.0 * third)
     root = 0.5606 + a * (0.4906 - 0.0585 * a)
     for _ in range(2):
         cube = root * root * root
         root = root * ((cube + 2.0 * a) / (2.0 * cube + a))
-    # Of a root of 26 bits the square is exact.
+    # The square of a root of 26 bits is exact.
     root = upper_half(root)
     over = a / (root * root)
     root = root + root * ((over - root) / (2.0 * root + over))
@@ -236,7 +236,7 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     across, along = absolute(y) + 0.0, absolute(x) + 0.0
     steep = less(along, across)
     small, large = where(steep, along, across), where(steep, across, along)
-    # The angle of two infinities is that of equal numbers, of two zeros none; a NaN stays.
+    # Two infinities count as equal numbers, and two zeros give angle zero; NaN stays.
     endless = less(_LARGE, large)
     small = where(endless, where(less(_LARGE, small), 1.0, 0.0 * small), small)
     large = where(either(endless, less_equal(large, 0.0)), 1.0, large)

@@ -1,16 +1,16 @@
-"""The matrix exponential. SciPy's would be all that most commands load `scipy.linalg` for, which takes them longer."""
+"""The matrix exponential, without SciPy: most commands would load `scipy.linalg` for it alone, which takes longer."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 BITS = 256
-"""The working precision: squaring doubles what rounding leaves, once for each binary digit of the matrix's size."""
+"""Working precision in bits: each squaring doubles the rounding error, once per binary digit of the norm."""
 
 
 def exponential(a: Array) -> Array:
-    """Return e^A of a matrix (n, n); what overflows is not finite."""
-    # Loaded here, because loops are flown without it.
+    """Return e^A (n, n) of a matrix (n, n); entries that overflow are not finite."""
+    # Loaded here, because flights do not need it.
     from flint import arb_mat, ctx
 
     with ctx.workprec(BITS):

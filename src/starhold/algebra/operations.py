@@ -1,7 +1,7 @@
-"""An operation has a plain meaning, and one for every other reader of an equation.
+"""Operations of equations: each has a meaning for floats and one for every other reader of an equation.
 
-An operation is written once, as a function of floats under `@operation(...)`, which names its meaning for SymPy, for
-exact polynomials, and in the languages that a trace is printed in. The type of a number picks the meaning.
+An operation is written once, as a function of floats under `@operation(...)`, which gives its meaning for SymPy, for exact
+polynomials, and in the languages in which a trace is printed. The type of a number selects the meaning.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar, cast
 from starhold.errors import InputError
 
 NUMBER, TRUTH, WORD, INDEX, UNIFORM, STATIC = "number", "truth", "word", "index", "uniform", "static"
-"""Kinds of values: numbers (IEEE doubles), truths, 64-bit unsigned words, and the two that all lanes share: indices (counts
-and counters of loops) and truths about them. A static argument is a Python number known while recording."""
+"""Kinds of values: numbers (IEEE doubles), truths, 64-bit unsigned words, and two kinds that all lanes share: indices
+(counts and counters of loops) and truths about indices. A static argument is a Python number known while recording."""
 
 PRINTED = ("llvm", "c", "javascript")
-"""Languages; a text for each, with {0}, {1}, ... for the operands."""
+"""Languages in which traces are printed; an operation has a text for each, with {0}, {1}, ... for the operands."""
 EXACT = ("symbolic", "polynomial")
-"""Readers that prove; operations on words and indices mean nothing to them."""
+"""Readers used in proofs; operations on words and indices have no meaning for them."""
 
 _PLAIN = frozenset((float, int, bool))
 _LIBRARIES = {"sympy": "symbolic", "flint": "polynomial"}
-"""Whose numbers read as what; those of flint are coefficients."""
+"""Reader of the numbers of each library; those of flint are coefficients."""
 
 
 class Operation(NamedTuple):
@@ -72,8 +72,8 @@ _Form: TypeAlias = Callable[[Any], Any] | Callable[[Any, Any], Any]
 
 
 def whole(symbolic: _Form, *slopes: _Form) -> Callable[[_Function], _Function]:
-    """Make an equation of numbers a function that readers which prove know as one. symbolic: its form in SymPy; slopes: its
-    derivatives by each argument, functions of floats. Floats and traces read the equation itself."""
+    """Make an equation one function for the readers used in proofs. symbolic: its form in SymPy; slopes: its derivatives
+    with respect to each argument, functions of floats. Floats and traces read the equation itself."""
 
     def register(equation: _Function) -> _Function:
         name = equation.__name__
@@ -95,7 +95,7 @@ def whole(symbolic: _Form, *slopes: _Form) -> Callable[[_Function], _Function]:
 
 
 def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
-    """Apply the operation as the reader of the values does."""
+    """Apply the operation in the meaning that it has for the reader of the values."""
     readers = [_reader(value) for value in values]
     for value, reader in zip(values, readers, strict=True):
         if reader == "record":
@@ -111,7 +111,7 @@ def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
 
 
 def _reader(value: Any) -> str | None:
-    """Return the reader of a number; None for plain ones. InputError for what nothing gives."""
+    """Return the reader of a number; None for plain ones. Raise InputError for an absent quantity."""
     if value is ABSENT:
         refuse_absent()
     return _reader_of(cast(Any, type(value)))
@@ -129,7 +129,7 @@ def _reader_of(cls: Any) -> str | None:
 
 
 class Absent(tuple[()]):
-    """A quantity that nothing gives has no numbers, and refuses to be used."""
+    """A quantity that no part provides: using it raises an error."""
 
     __slots__ = ()
 
@@ -144,7 +144,7 @@ ABSENT = Absent()
 
 
 def refuse_absent() -> NoReturn:
-    """Raise an InputError that points at the line where an equation uses a quantity that nothing gives."""
+    """Raise an InputError that names the line where an equation uses a quantity that no part provides."""
     place, text = written_at()
     allowed = (
         'quantities that the loop has; a law gets time and is_valid where its file says READS = ("time",), ("is_valid",)'
@@ -153,8 +153,8 @@ def refuse_absent() -> NoReturn:
 
 
 def written_at() -> tuple[str, str]:
-    """Return where the equation that runs now is written, and the text of that line. For a law this is its name and the
-    line of its file, even inside a library that it calls."""
+    """Return the place of the line that runs now, and its text. For a law the place is its name and the line of its file,
+    even inside a library that it calls."""
     frame: Any = sys._getframe(1)  # pyright: ignore[reportPrivateUsage]
     frames: list[Any] = []
     while frame is not None:
@@ -168,16 +168,16 @@ def written_at() -> tuple[str, str]:
 
 
 def library(name: str) -> Any:
-    """Return a reader's module, loaded when its first number is met; named at run time because its types are too loose
-    for a strict checker."""
+    """Return a reader's module, loaded when its first number appears. It is imported by name, because its types are too
+    loose for a strict checker."""
     return import_module(name)
 
 
 class UnreadableError(TypeError):
-    """A reader that proves cannot follow an equation; the text names the operation and the line."""
+    """A reader used in proofs cannot follow an equation; the message names the operation and the line."""
 
 
 def unreadable(what: str) -> UnreadableError:
-    """Return the error that names an operation and where it is written."""
+    """Return the error that names an operation and its place in the file."""
     place, text = written_at()
     return UnreadableError(f"{place}: {what}, in `{text}`")

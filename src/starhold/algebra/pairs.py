@@ -1,6 +1,6 @@
-"""Sums, products and quotients are kept with their rounding errors: a pair of numbers stands for their exact sum.
+"""Sums, products and quotients with their rounding errors: a pair of numbers stands for their exact sum.
 
-They hold where nothing overflows, and where no product lies near the least numbers (Dekker 1971; Knuth, The Art of Computer
+They are valid where nothing overflows and no product comes near underflow (Dekker 1971; Knuth, The Art of Computer
 Programming, 4.2.2).
 """
 
@@ -11,7 +11,7 @@ from typing import TypeAlias
 from starhold.algebra.scalar import Scalar, divide
 
 Pair: TypeAlias = tuple[Scalar, Scalar]
-"""A number, and what is to be added to it."""
+"""A number and its correction: their exact sum is meant."""
 
 
 def sum_of(a: Scalar, b: Scalar) -> Pair:
@@ -47,7 +47,7 @@ def plus(a: Pair, b: Pair) -> Pair:
 
 
 def quotient(a: Scalar, b: Pair) -> Pair:
-    """Return a over a pair, to about 100 bits; infinite or NaN where that is zero."""
+    """Return a divided by a pair, to about 100 bits; infinite or NaN where the pair is zero."""
     first = divide(a, b[0])
     total, error = product_of(first, b[0])
     return first, divide(((a - total) - error) - first * b[1], b[0])

@@ -1,7 +1,7 @@
-"""Exact polynomials read the equations: coefficients are rationals (or balls), floats are taken at their exact value.
+"""Exact polynomials as readers of equations: coefficients are rationals (or balls), and floats have their exact value.
 
 A comparison that depends on a variable splits the result into cases, so that an equation with `clip` or `sign` reads as a
-piecewise polynomial. Nothing is rounded: what two readings have in common holds for all values of the variables.
+piecewise polynomial. Nothing is rounded: an identity between two readings holds for all values of the variables.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from flint import arb, fmpq
 from starhold.algebra.operations import unreadable
 
 Coefficient: TypeAlias = Any
-"""A rational (`fmpq`), or a ball (`arb`) where a coefficient is known to lie in it."""
+"""A rational (`fmpq`), or a ball (`arb`) that contains the coefficient."""
 Monomial: TypeAlias = tuple[str, ...]
-"""Variables in alphabetic order, one repeated as often as its power says; () is the constant."""
+"""Variables in alphabetical order, each repeated as many times as its power; () is the constant."""
 
 
 def exact(number: Any) -> Coefficient:
-    """Return a number as a rational of the same value; balls stay. ValueError for numbers that are not finite."""
+    """Return a number as a rational of the same value, a ball as it is. Raise ValueError unless it is finite."""
     if isinstance(number, (fmpq, arb)):
         return number
     try:
@@ -69,11 +69,11 @@ class Polynomial:
         return self.terms.get(()) if len(self.terms) == 1 else None
 
     def variables(self) -> set[str]:
-        """Return the names it depends on."""
+        """Return the names of the variables in it."""
         return {name for monomial in self.terms for name in monomial}
 
     def slope(self, name: str) -> Polynomial:
-        """Return the partial derivative."""
+        """Return the partial derivative with respect to `name`."""
         terms: dict[Monomial, Coefficient] = {}
         for monomial, c in self.terms.items():
             power = monomial.count(name)
@@ -83,7 +83,7 @@ class Polynomial:
         return Polynomial(terms)
 
     def at(self, values: Mapping[str, Any]) -> Coefficient:
-        """Return its value where every variable has one."""
+        """Return its value for given values of all variables."""
         total: Coefficient = fmpq(0)
         for monomial, c in self.terms.items():
             for name in monomial:
@@ -144,8 +144,8 @@ _RECIPROCALS: ContextVar[tuple[tuple[Polynomial, str], ...]] = ContextVar("recip
 
 @contextmanager
 def reciprocal(divisor: Any, name: str) -> Generator[None]:
-    """Inside this context, division by the polynomial is multiplication by the variable `name`, which stands for its
-    reciprocal: results are identities only together with divisor * name = 1."""
+    """Inside this context, division by `divisor` is multiplication by the variable `name`, which stands for its reciprocal:
+    results are identities only together with divisor * name = 1."""
     token = _RECIPROCALS.set((*_RECIPROCALS.get(), (divisor, name)))
     try:
         yield
@@ -162,20 +162,20 @@ class Condition:
 
     @cached_property
     def key(self) -> tuple[Any, ...]:
-        """A key that is equal for equal polynomials."""
+        """Return a key that is equal for equal polynomials."""
         return tuple(sorted((m, str(c)) for m, c in self.positive.terms.items()))
 
 
 @dataclass(frozen=True)
 class Case:
-    """A case of a piecewise polynomial has conditions, each true or false there, and a polynomial."""
+    """One case of a piecewise polynomial: conditions, each true or false in it, and a polynomial."""
 
     truths: tuple[tuple[Condition, bool], ...]
     value: Polynomial
 
 
 class Cases:
-    """A piecewise polynomial has cases that exclude one another and leave nothing out."""
+    """A piecewise polynomial: cases that exclude one another and together cover everything."""
 
     __slots__ = ("pieces",)
     reader = "polynomial"
@@ -216,22 +216,22 @@ class Cases:
 
 @dataclass(frozen=True)
 class Split:
-    """A comparison of piecewise polynomials has cases, each with the comparison's truth or condition there."""
+    """A comparison of piecewise polynomials: cases, each with the truth of the comparison or its condition."""
 
     pieces: tuple[tuple[tuple[tuple[Condition, bool], ...], bool | Condition], ...]
     reader: ClassVar[str] = "polynomial"
 
 
 def pieces(value: Any) -> tuple[Case, ...]:
-    """Return the cases of a piecewise polynomial; of a polynomial or a number the only one."""
+    """Return the cases of a piecewise polynomial; a polynomial or a number has a single case."""
     return value.pieces if isinstance(value, Cases) else (Case((), _polynomial(value)),)
 
 
 def jointly(
     values: Iterable[Any], most: int | None = None
 ) -> list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]]:
-    """Return the cases of several piecewise polynomials at once: conditions and one polynomial for each value. ValueError
-    for more than `most` cases."""
+    """Return the joint cases of several piecewise polynomials: conditions and one polynomial for each value. Raise Raise
+    ValueError for more than `most` cases."""
     cells: list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]] = [((), [])]
     for value in values:
         cells = [
@@ -252,7 +252,7 @@ def _polynomial(value: Any) -> Polynomial:
 def _merged(
     a: tuple[tuple[Condition, bool], ...], b: tuple[tuple[Condition, bool], ...]
 ) -> tuple[tuple[Condition, bool], ...] | None:
-    """Return both sets of conditions, None where they contradict one another."""
+    """Return the union of two sets of conditions, or None if they contradict one another."""
     merged = {condition.key: (condition, truth) for condition, truth in a}
     for condition, truth in b:
         if merged.setdefault(condition.key, (condition, truth))[1] != truth:
@@ -260,7 +260,7 @@ def _merged(
     positive = [condition.positive for condition, truth in merged.values() if truth]
     for place, one in enumerate(positive):
         for other in positive[place + 1 :]:
-            # The sum can be a number only where both have the same monomials but for the constant.
+            # The sum can be constant only if both have the same monomials apart from the constant.
             if (one.terms.keys() ^ other.terms.keys()) - {()}:
                 continue
             total = (one + other).value

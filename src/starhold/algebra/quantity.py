@@ -1,5 +1,4 @@
-"""Annotations give the fields of a state or of an argument a unit and a meaning; tables, recordings and checks read
-them."""
+"""Annotations give the fields of states and arguments a unit and a meaning, for tables, recordings and checks."""
 
 from __future__ import annotations
 
@@ -7,8 +6,8 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 
 class Quantity(NamedTuple):
-    """A field has a unit and a meaning. `dimension` names the index of its components in recordings: "axis" for
-    vectors, "quaternion", "wheel"; "" for a single number."""
+    """Unit and meaning of a field. `dimension` names the index of its components in recordings: "axis" for vectors,
+    "quaternion", "wheel"; "" for a single number."""
 
     unit: str
     text: str
@@ -16,8 +15,8 @@ class Quantity(NamedTuple):
 
 
 def quantities(cls: Any) -> dict[str, Quantity]:
-    """Return the quantities of a NamedTuple whose fields are all annotated with one, by name, in order; TypeError where
-    one is not."""
+    """Return the quantities of a NamedTuple by field name, in order. Raise TypeError if a field is not annotated with
+    one."""
     hints = get_type_hints(cls, include_extras=True)
     known = {name: next((a for a in get_args(hints[name]) if isinstance(a, Quantity)), None) for name in cls._fields}
     if None in known.values():

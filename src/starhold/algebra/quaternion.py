@@ -1,4 +1,4 @@
-"""Quaternions are of unit length, scalar first, with the Hamilton product.
+"""Quaternions of unit length, scalar first, with the Hamilton product.
 
 `q` takes reference (usually inertial) axes to body axes: a vector with reference components r has body components
 R = q* r q. The quaternions q and -q are the same attitude.
@@ -47,7 +47,7 @@ def normalise(q: Quaternion) -> Quaternion:
 
 
 def renormalise(q: Quaternion) -> Quaternion:
-    """Bring a quaternion of nearly unit length back to it by one Newton step: an error e of |q|^2 leaves 3/8 e^2 of |q|."""
+    """Restore a quaternion of nearly unit length by a Newton step: an error e of |q|^2 leaves 3/8 e^2 in |q|."""
     return stretch(1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q)
 
 

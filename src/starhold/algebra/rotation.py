@@ -1,5 +1,4 @@
-"""Quaternions are converted into rotation vectors and modified Rodrigues parameters, and back, by arithmetic alone, for laws
-and kernels."""
+"""Conversions between quaternions, rotation vectors and modified Rodrigues parameters, by arithmetic alone."""
 
 from __future__ import annotations
 
@@ -11,7 +10,7 @@ from starhold.algebra.scalar import Scalar, absolute, minimum, side, sqrt
 from starhold.algebra.vector import Vector, dot, scale
 
 _TERMS = 20
-"""Terms of the series of asin(x) / x; for x^2 <= sin(pi/8)^2 the remainder is below 2^-55."""
+"""Number of terms of the series of asin(x) / x; for x^2 <= sin(pi/8)^2 the remainder is below 2^-55."""
 _SERIES = tuple(float(Fraction(comb(2 * n, n), 4**n * (2 * n + 1))) for n in range(_TERMS))
 
 
@@ -32,13 +31,14 @@ def rotation_vector(q: Quaternion) -> Vector:
 
 
 def modified_rodrigues(q: Quaternion, factor: Scalar = 1.0) -> Vector:
-    """Return the modified Rodrigues parameters of the turn below 180 degrees, tan(angle/4) axis, times a factor."""
+    """Return the modified Rodrigues parameters, tan(angle/4) axis, of the turn below 180 degrees, times `factor`."""
     near = side(q[0])
     return scale(factor * near / (1.0 + near * q[0]), vector_part(q))
 
 
 def short_turn(half: Vector) -> Quaternion:
-    """Return the quaternion of half a rotation vector (rad); the error is below |half|^7 / 5000, rounding up to 0.02 rad."""
+    """Return the quaternion of half a rotation vector (rad). Its error, |half|^7 / 5000, is below rounding up to 0.02
+    rad."""
     square = dot(half, half)
     scalar = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))
     x, y, z = scale(1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0)), half)

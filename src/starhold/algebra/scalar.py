@@ -1,8 +1,8 @@
-"""Every reader of an equation understands these scalar operations.
+"""The scalar operations of which equations are made, for every reader.
 
 An equation is a plain function over numbers and tuples of numbers. Python floats, a trace (which is printed as machine
-code, C and JavaScript), SymPy symbols, dual numbers and exact polynomials all read the same text, so it may use only
-`+ - * /`, other equations, the operations of this module and the loops of `structured`: no `math`, no `if` on a number, no
+code, C and JavaScript), SymPy symbols, dual numbers and exact polynomials all read the same function, so it may use only `+
+- * /`, other equations, the operations of this module and the loops of `structured`: no `math`, no `if` on a number, no
 NumPy array.
 
 A comparison yields a `Truth`; only `where`, `both`, `either` and `opposite` consume it.
@@ -17,13 +17,13 @@ from typing import Any, TypeAlias, cast
 from starhold.algebra.operations import EXACT, library, operation
 
 Scalar: TypeAlias = float
-"""A number of any reader; typed as float, the reader that type checkers can follow."""
+"""A number of any reader; declared as float, which type checkers can follow."""
 Truth: TypeAlias = Any
 """The type of a comparison: a bool, a SymPy relation, or a recorded truth."""
 
 
 def _native(operator: Any) -> dict[str, Any]:
-    """Return the meanings of a Python operator, which the numbers of these readers define themselves."""
+    """Return the meanings of a Python operator for readers whose numbers define it themselves."""
     return dict.fromkeys(EXACT, operator)
 
 
@@ -68,7 +68,7 @@ def product(a: Scalar, b: Scalar) -> Scalar:
 @operation("number number", "number", llvm="fdiv {number} {0}, {1}", c="{0} / {1}", javascript="{0} / {1}",
            **_native(cast(Any, op).truediv))  # fmt: skip
 def divide(a: Scalar, b: Scalar) -> Scalar:
-    """Return a / b, infinite or NaN where b is zero, as compiled code gives: for quotients that `where` may not choose."""
+    """Return a / b, infinite or NaN where b is zero, as in compiled code: for quotients that `where` may discard."""
     if b == 0.0:
         return math.nan if a == 0.0 or math.isnan(a) else math.copysign(math.inf, a) * math.copysign(1.0, b)
     return a / b
@@ -84,7 +84,7 @@ def negative(a: Scalar) -> Scalar:
 @operation("number", "number", llvm="call {number} @llvm.sqrt.{suffix}({number} {0})", c="sqrt({0})",
            javascript="Math.sqrt({0})", symbolic=_sympy("sqrt"), polynomial=_polynomial("sqrt"))  # fmt: skip
 def sqrt(x: Scalar) -> Scalar:
-    """Return the square root; NaN for a negative float, as compiled code gives."""
+    """Return the square root; NaN for a negative float, as in compiled code."""
     return math.sqrt(x) if x >= 0.0 else math.nan
 
 
@@ -110,7 +110,7 @@ def _symbolic_select(condition: Any, a: Any, b: Any) -> Any:
            javascript="{0} ? {1} : {2}", symbolic=_symbolic_select,
            polynomial=_polynomial("where"))  # fmt: skip
 def select(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
-    """Do as `where` does, on a condition that is not known while recording."""
+    """Return what `where` does, for a condition that is not known while recording."""
     return a if condition else b
 
 
@@ -124,21 +124,21 @@ def where(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
 @operation("truth truth", "truth", llvm="and {truth} {0}, {1}", c="{0} && {1}", javascript="{0} && {1}",
            symbolic=_sympy("And"), polynomial=_polynomial("both"))  # fmt: skip
 def both(a: Truth, b: Truth) -> Truth:
-    """Return the logical and, without short circuit."""
+    """Return the logical AND, without short circuit."""
     return a and b
 
 
 @operation("truth truth", "truth", llvm="or {truth} {0}, {1}", c="{0} || {1}", javascript="{0} || {1}",
            symbolic=_sympy("Or"), polynomial=_polynomial("either"))  # fmt: skip
 def either(a: Truth, b: Truth) -> Truth:
-    """Return the logical or, without short circuit."""
+    """Return the logical OR, without short circuit."""
     return a or b
 
 
 @operation("truth", "truth", llvm="xor {truth} {0}, {yes}", c="!{0}", javascript="!{0}",
            symbolic=_sympy("Not"), polynomial=_polynomial("opposite"))  # fmt: skip
 def opposite(a: Truth) -> Truth:
-    """Return the logical not."""
+    """Return the logical NOT."""
     return not a
 
 
@@ -148,7 +148,7 @@ def absolute(x: Scalar) -> Scalar:
 
 
 def minimum(a: Scalar, b: Scalar) -> Scalar:
-    """Return the smaller; NaN in either argument is not hidden when it is the second."""
+    """Return the smaller number; a NaN in the second argument is returned."""
     return where(less(a, b), a, b)
 
 
@@ -163,7 +163,7 @@ def sign(x: Scalar) -> Scalar:
 
 
 def side(x: Scalar) -> Scalar:
-    """Return -1 for negative x, else +1: the sign that never vanishes."""
+    """Return -1 for negative x, else +1: a sign that is never zero."""
     return where(less(x, 0.0), -1.0, 1.0)
 
 

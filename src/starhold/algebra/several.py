@@ -1,8 +1,7 @@
 """Operations on tuples of any length: an equation applied to every element, or a weighted sum.
 
-When recorded they are unrolled for the lengths of their arguments: a step with any number of wheels costs no more than
-one written by hand. The elements may differ in shape from one to the next; those of one shape fly in short vectors where a
-processor flies one lane."""
+When recorded, they are unrolled to the lengths of their arguments: a step with any number of wheels costs no more than one
+written by hand. Elements may differ in shape; on one lane, those of the same shape are computed in short vectors."""
 
 from __future__ import annotations
 
@@ -21,8 +20,7 @@ _Value = TypeVar("_Value")
 
 def each(function: Callable[..., _Value], columns: tuple[tuple[Any, ...], ...], *shared: Any) -> tuple[_Value, ...]:
     """Return (function(c[0][0], c[1][0], ..., *shared), function(c[0][1], ...), ...): the equation applied to the first
-    elements of all columns, to the second ones, and so on. The columns are of one length; `shared` goes to every call as it
-    is."""
+    elements of all columns, to the second ones, and so on. All columns have the same length; every call gets `shared`."""
     rows, recorder = [*zip(*columns, strict=True)], RECORDER.get()
     if recorder is not None:
         return recorder.each(function, rows, shared)
@@ -30,8 +28,8 @@ def each(function: Callable[..., _Value], columns: tuple[tuple[Any, ...], ...], 
 
 
 def folded(begin: Callable[..., Any], further: Callable[..., Any], rows: Sequence[Sequence[Any]]) -> Iterable[Any]:
-    """Return further(... further(begin(*row[0]), *row[1]) ..., *row[-1]) of every row, each as it is asked for, or all at
-    once. No row is longer than the one before."""
+    """Return further(... further(begin(*row[0]), *row[1]) ..., *row[-1]) for every row, lazily or all at once. No row is
+    longer than the one before."""
     recorder = RECORDER.get()
     if recorder is None or not recorder.by_rows:
         return (reduce(lambda total, item: further(total, *item), row[1:], begin(*row[0])) for row in rows)
@@ -43,7 +41,7 @@ def folded(begin: Callable[..., Any], further: Callable[..., Any], rows: Sequenc
 
 
 def weighted(weights: tuple[Scalar, ...], vectors: tuple[Vector, ...]) -> Vector:
-    """Return the sum of weights[i] * vectors[i], from the first to the last; there is at least one."""
+    """Return the sum of weights[i] * vectors[i], added from the first to the last; there is at least one."""
     x, y, z = (weights[0] * component for component in vectors[0])
     for weight, (a, b, c) in zip(weights[1:], vectors[1:], strict=True):
         x, y, z = x + weight * a, y + weight * b, z + weight * c

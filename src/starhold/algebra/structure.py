@@ -1,4 +1,4 @@
-"""States, which are nested NamedTuples and tuples of floats of any shape, are moved as a whole and written as numbers in
+"""States, nested NamedTuples and tuples of floats of any shape, are updated as a whole and flattened into numbers in
 order."""
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _State = TypeVar("_State")
 
 
 def move(state: _State, step: float, rate: Any) -> _State:
-    """Return state + step * rate, component by component; where the rate is None the state stays."""
+    """Return state + step * rate, component by component; where the rate is None the state is unchanged."""
     if rate is None:
         return state
     if not isinstance(state, tuple):
@@ -27,7 +27,7 @@ def move(state: _State, step: float, rate: Any) -> _State:
 
 
 def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the classical Runge-Kutta substep of fourth order for d(state)/dt = slope(state, *more)."""
+    """Return the substep of the classical fourth-order Runge-Kutta method for d(state)/dt = slope(state, *more)."""
 
     def advance(state: Any, h: Any, *more: Any) -> Any:
         a = slope(state, *more)
@@ -63,7 +63,7 @@ def rebuild(like: Any, parts: Sequence[Any]) -> Any:
 
 
 def put(value: Any, path: Sequence[str | int], new: Any) -> Any:
-    """Return a structure with another part at a path of fields and places."""
+    """Return a structure in which the part at a path of fields and indices is replaced."""
     if not path:
         return new
     place = value._fields.index(path[0]) if isinstance(path[0], str) else path[0]
@@ -71,7 +71,7 @@ def put(value: Any, path: Sequence[str | int], new: Any) -> Any:
 
 
 def chosen(truth: Truth, one: _State, other: _State) -> _State:
-    """Return one state where the truth holds, else the other, number by number; buffers are those of the other."""
+    """Return `one` where the truth holds, else `other`, number by number; buffers are those of `other`."""
 
     def choose(a: Any, b: Any) -> Any:
         if isinstance(a, tuple):
@@ -82,19 +82,19 @@ def chosen(truth: Truth, one: _State, other: _State) -> _State:
 
 
 def flatten(state: Any) -> list[float]:
-    """Return the numbers of a state in order. Buffers, which a law's memory may hold, are not among them: they change in
+    """Return the numbers of a state in order, without buffers, which a law's memory may contain and which change in
     place."""
     return [leaf for leaf in leaves(state) if not isinstance(leaf, Buffer)]
 
 
 def places(state: Any) -> Any:
-    """Return the state with each number replaced by its place in `flatten(state)`."""
+    """Return the state with each number replaced by its index in `flatten(state)`."""
     count = iter(range(1 << 40))
     return mapped(state, lambda leaf: leaf if isinstance(leaf, Buffer) else next(count))
 
 
 def rows(state: Any) -> Any:
-    """Return the state with each field replaced by the slice of its rows in a table of `flatten`ed states."""
+    """Return the state with each field replaced by the slice of its rows in a table of flattened states."""
     ends = [len(flatten(tuple(state[: k + 1]))) for k in range(len(state))]
     return rebuild(state, [slice(first, last) for first, last in zip([0, *ends], ends, strict=False)])
 
@@ -110,7 +110,7 @@ def buffers(state: Any) -> list[Buffer]:
 
 
 def unflatten(numbers: Any, like: _State) -> _State:
-    """Return the state shaped like `like` that holds these numbers in order (rows of lanes stay arrays), and the buffers of
+    """Return the state shaped like `like` made of these numbers in order (rows of lanes stay arrays) and the buffers of
     `like`."""
     source = iter(numbers.tolist() if hasattr(numbers, "tolist") else numbers)
 
@@ -124,7 +124,7 @@ def unflatten(numbers: Any, like: _State) -> _State:
 
 
 def alike(values: Sequence[_State]) -> list[_State]:
-    """Return the values; where some have a matrix and others its diagonal as a vector, all get a matrix."""
+    """Return the values in one shape: where some have a matrix and others its diagonal as a vector, all get a matrix."""
     return [reduce(_widened, values, value) for value in values]
 
 

@@ -1,11 +1,11 @@
-"""Equations have loops, branches and buffers of these forms.
+"""The forms of loops, branches and buffers that equations may use.
 
-`repeat` counts, `until` watches numbers, `when` and `unless` are branches; what changes is handed from turn to turn, as a
-tuple of states. A `Buffer` holds numbers in memory. In plain Python these are ordinary loops and lists; while a trace is
-recorded they become loops of the trace, which every lane of a batch goes through together: a lane that is done only waits.
+`repeat` counts, `until` tests numbers, `when` and `unless` are branches; the state of a loop is passed from iteration to
+iteration, as a tuple. A `Buffer` holds numbers in memory. In plain Python these are ordinary loops and lists; while a trace
+is recorded they become loops of the trace, which all lanes of a batch execute together: a lane that has finished waits.
 
 Every loop has a bound that is known before it starts, and a buffer's index is made of counts and counters, never of
-numbers: so no address depends on data, and the work has a bound.
+numbers: so no address depends on data, and the work is bounded.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 class Buffer:
-    """A buffer holds numbers in memory from `base` on. `cells` is a list of floats, or memory of a trace; size: how many."""
+    """A buffer of `size` numbers in memory from `base` on. `cells` is a list of floats, or memory of a trace."""
 
     __slots__ = ("base", "cells", "size")
 
@@ -50,7 +50,7 @@ class Buffer:
         return self.base + index
 
     def part(self, start: Index, size: Index) -> Buffer:
-        """Return some of its numbers as a buffer of their own, in the same memory."""
+        """Return `size` of its numbers from `start` on as a buffer in the same memory."""
         return Buffer(self.cells, self.base + start, size)
 
     def row(self, k: Index, width: int) -> tuple[Scalar, ...]:
@@ -58,15 +58,15 @@ class Buffer:
         return tuple(self[width * k + i] for i in range(width))
 
     def put(self, k: Index, values: Iterable[Scalar]) -> None:
-        """Write the k-th group."""
+        """Write `values` as the k-th group of that many numbers."""
         numbers = tuple(values)
         for i, value in enumerate(numbers):
             self[len(numbers) * k + i] = value
 
 
 def repeat(count: Index, body: Callable[..., Any], *state: Any, stop: Callable[..., Truth] | None = None) -> State:
-    """Return the state after body(0, *state), body(1, *state), and so on, `count` times; each gives the next, a tuple (None
-    where there is no state). It ends early once stop(*state) holds, which must not write to buffers."""
+    """Return the state after body(0, *state), body(1, *state), and so on, `count` times; each returns the next state, a
+    tuple (None where there is no state). It ends early once stop(*state) holds; `stop` must not write to buffers."""
     recorder = RECORDER.get()
     if recorder is not None:
         return recorder.loop(count, stop, body, state, counted=True)
@@ -91,8 +91,8 @@ def until(done: Callable[..., Truth], body: Callable[..., Any], *state: Any, at_
 
 
 def unless(truth: Truth, body: Callable[..., Any], *state: Any) -> State:
-    """Return body(*state) where the truth does not hold, else the state: a branch, taken where a lane needs it. For a few
-    operations `where` costs less."""
+    """Return body(*state) where the truth does not hold, else the state: a branch that runs only if a lane needs it. For a
+    few operations `where` costs less."""
     if truth is True or truth is False:
         return state if truth else body(*state) or ()
     return until(lambda *_: truth, body, *state, at_most=1)
@@ -104,7 +104,7 @@ def when(truth: Truth, body: Callable[..., Any], *state: Any) -> State:
 
 
 def at(index: Index, place: Index, body: Callable[..., Any]) -> None:
-    """Run body() in the iteration of a loop whose index is `place`; it returns nothing, but may write to buffers."""
+    """Run body() in the loop iteration in which `index` is `place`; it returns nothing, but may write to buffers."""
     recorder = RECORDER.get()
     if recorder is not None:
         recorder.branch(same_index(index, place), body)
@@ -113,8 +113,8 @@ def at(index: Index, place: Index, body: Callable[..., Any]) -> None:
 
 
 def function(equation: _Function) -> _Function:
-    """Record an equation once as a function of the trace, for one too long to be written out at each call. It reads and
-    writes nothing but its arguments; Python's whole numbers and truths are constants of it."""
+    """Record an equation once as a function of the trace, for equations too long to be repeated at each call. It reads and
+    writes nothing but its arguments; Python's integers and booleans are constants in it."""
 
     @wraps(equation)
     def call(*values: Any) -> Any:

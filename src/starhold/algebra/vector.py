@@ -50,7 +50,7 @@ def norm(a: Vector) -> Scalar:
 
 
 def most(a: tuple[Scalar, ...]) -> Scalar:
-    """Return the largest size of a component."""
+    """Return the largest absolute value of a component."""
     largest = absolute(a[0])
     for component in a[1:]:
         largest = maximum(largest, absolute(component))
@@ -73,14 +73,13 @@ def clip_axes(a: Vector, limit: Scalar) -> Vector:
 
 
 def clip_norm(a: Vector, limit: Scalar) -> Vector:
-    """Shorten a to the given length where it is longer; the direction is kept. The limit must be positive; it may be
-    infinite."""
+    """Scale a down to length `limit` where it is longer. The limit must be positive; it may be infinite."""
     length = norm(a)
     return scale(where(less(length, limit), 1.0, limit / maximum(limit, length)), a)
 
 
 def apply(m: Matrix | Vector, a: Vector) -> Vector:
-    """Return the matrix-vector product; a vector in place of the matrix is a diagonal one."""
+    """Return the matrix-vector product; a vector in place of the matrix stands for a diagonal one."""
     rows: Any = m
     return times(rows, a) if _is_diagonal(m) else (dot(rows[0], a), dot(rows[1], a), dot(rows[2], a))
 
@@ -95,7 +94,7 @@ def gyroscopic_torque(m: Matrix | Vector, a: Vector) -> Vector:
 
 
 def solve(m: Matrix | Vector, a: Vector) -> Vector:
-    """Return the x with m x = a; not defined for a singular matrix. A vector in place of the matrix is a diagonal one."""
+    """Return the x with m x = a; not defined for a singular matrix. A vector stands for a diagonal matrix."""
     rows: Any = m
     return (a[0] / rows[0], a[1] / rows[1], a[2] / rows[2]) if _is_diagonal(m) else apply(inverse(rows), a)
 
@@ -149,7 +148,7 @@ def diagonal(a: Vector) -> Matrix:
 
 
 def along_axis(axis: Vector, along: Scalar, across: Scalar) -> Matrix:
-    """The symmetric matrix that multiplies vectors along an axis, a unit vector, and across it."""
+    """Return the symmetric matrix that multiplies vectors along a unit vector by `along`, others across it by `across`."""
     more = along - across
     return (
         add((across, 0.0, 0.0), scale(more * axis[0], axis)),
@@ -174,14 +173,14 @@ SWEEPS = 6
 
 
 def principal_moments(m: Matrix | Vector) -> Vector:
-    """Return the eigenvalues of a symmetric matrix, or of the diagonal one with these entries, the least first."""
+    """Return the eigenvalues of a symmetric matrix, or of the diagonal one with these entries, in ascending order."""
     a, b, c = _diagonal_of(m)
     low, high = minimum(minimum(a, b), c), maximum(maximum(a, b), c)
     return low, maximum(minimum(a, b), minimum(maximum(a, b), c)), high
 
 
 def _diagonal_of(m: Matrix | Vector) -> Vector:
-    """Return the diagonal after Jacobi's rotations."""
+    """Return the diagonal after `SWEEPS` sweeps of Jacobi's rotations."""
     if _is_diagonal(m):
         return m  # pyright: ignore
     a: Any = [list(row) for row in m]  # pyright: ignore
@@ -201,7 +200,7 @@ def _diagonal_of(m: Matrix | Vector) -> Vector:
 
 
 def decays(m: Matrix | Vector) -> Truth:
-    """Tell whether x' = m x comes to rest, all eigenvalues having real parts below zero, by Routh's criterion."""
+    """Tell whether x' = m x is asymptotically stable (all eigenvalues in the left half plane), by Routh's criterion."""
     if _is_diagonal(m):
         return both(both(less(m[0], 0.0), less(m[1], 0.0)), less(m[2], 0.0))  # pyright: ignore
     rows: Any = m

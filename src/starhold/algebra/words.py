@@ -1,8 +1,8 @@
-"""Random numbers are made by operations on 64-bit words, and between them, numbers and the indices of loops.
+"""Operations on 64-bit words, of which random numbers are made, and conversions to numbers and loop indices.
 
-In plain Python a word is an int from 0 to 2^64 - 1. JavaScript has no such integers: there a word is two signed ones of
-32 bits, and its texts speak of their halves as {0h} and {0l}. An operation that gives a word has a text for each half;
-the low half is computed first, and the text of the high half may name it {low}.
+In plain Python a word is an int from 0 to 2^64 - 1. JavaScript has no such integers: there a word is two signed ones of 32
+bits, and texts refer to these halves as {0h} and {0l}. An operation that gives a word has a text for each half; the low
+half is computed first, and the text of the high half may refer to it as {low}.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ MASK = 0xFFFFFFFFFFFFFFFF
 
 
 def _rotated(count: int) -> tuple[str, str]:
-    """Return both halves of a word turned to the left, in JavaScript."""
+    """Return both halves of a word rotated left by `count` bits, in JavaScript."""
     high, low = ("{0l}", "{0h}") if count >= 32 else ("{0h}", "{0l}")
     count %= 32
     if count == 0:
@@ -27,7 +27,7 @@ def _rotated(count: int) -> tuple[str, str]:
 
 
 def _shifted(count: int) -> tuple[str, str]:
-    """Return both halves of a word moved to the right."""
+    """Return both halves of a word shifted right by `count` bits, in JavaScript."""
     if count >= 32:
         return "0", f"{{0h}} >>> {count - 32} ^ 0"
     return f"{{0h}} >>> {count}", f"{{0l}} >>> {count} ^ {{0h}} << {32 - count}"
@@ -61,13 +61,13 @@ def word_or(a: int, b: int) -> int:
 @operation("word static", "word", llvm="call {word} @llvm.fshl.{words}({word} {0}, {word} {0}, {word} {1})",
            c="({0} << {1}) | ({0} >> (64 - {1}))", javascript=_rotated)  # fmt: skip
 def rotate_left(a: int, count: int) -> int:
-    """Return the bits turned to the left by 0 < count < 64 places."""
+    """Return the bits rotated left by 0 < count < 64 places."""
     return ((a << count) | (a >> (64 - count))) & MASK
 
 
 @operation("word static", "word", llvm="lshr {word} {0}, {1}", c="{0} >> {1}", javascript=_shifted)
 def shift_right(a: int, count: int) -> int:
-    """Return the bits moved to the right by 0 < count < 64 places, zeros moved in."""
+    """Return the bits shifted right by 0 < count < 64 places, filled with zeros."""
     return a >> count
 
 
@@ -80,7 +80,7 @@ def lowest_bit(a: int) -> Truth:
 @operation("number", "word", llvm="bitcast {number} {0} to {word}", c="bits_of({0})",
            javascript=("high_bits({0})", "low_bits({0})"))  # fmt: skip
 def bits_of(x: Scalar) -> int:
-    """Return the bits of an IEEE double; for a NaN those of some NaN, not the same on every machine."""
+    """Return the bits of an IEEE double; those of a NaN depend on the machine."""
     return int(struct.unpack("<Q", struct.pack("<d", x))[0])
 
 
@@ -129,7 +129,7 @@ def word_of(index: int) -> int:
 
 
 def whole_word(number: Any) -> Any:
-    """Return a whole number from 0 to 2^52 as a word: vector units convert no 64-bit integers."""
+    """Return an integer from 0 to 2^52 as a word, without conversion instructions, which vector units lack for 64 bits."""
     return word_and(bits_of(number + 4503599627370496.0), 0x000FFFFFFFFFFFFF)
 
 

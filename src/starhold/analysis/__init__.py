@@ -1,2 +1,2 @@
-"""Numbers from runs: metrics, rankings, transients, margins, the cost of a call, the linear loop, and when a flight leaves a
-claim."""
+"""Numbers from runs: metrics, rankings, transients, the cost of a call, the linear loop and its margins, and the time at
+which a flight leaves a claim."""

@@ -15,12 +15,12 @@ from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.simulation.lane import Recording
 
 COMMAND = "command"
-"""The recorded quantity that holds a law's command."""
+"""The recorded quantity of a law's command."""
 
 
 class Noted(NamedTuple):
-    """Notes on a lane: the peak of the command's components and the sum of its norm; for a window the largest squared norm
-    of each recorded quantity."""
+    """Notes on a lane: the peak of the command's components and the sum of its norm; per window the largest squared norm of
+    each recorded quantity."""
 
     peak: float
     total: float
@@ -28,7 +28,7 @@ class Noted(NamedTuple):
 
 
 def make_meter(recorded: Mapping[str, Quantity], steps: int, period: float, clock: str) -> Meter:
-    """The meter of these recorded quantities, for flights of `steps` control periods, or for as many samples at such
+    """Return the meter of these recorded quantities, for flights of `steps` control periods, or for as many samples at such
     intervals; clock: the unit of time."""
     recorded = _with_size(recorded)
     first = Noted(0.0, 0.0, (0.0,) * len(recorded))
@@ -45,8 +45,9 @@ def make_meter(recorded: Mapping[str, Quantity], steps: int, period: float, cloc
 
 
 def measure(run: Recording) -> dict[str, Any]:
-    """Metrics of a run: for each recorded quantity its largest norm in the last quarter, and of the command the peak of its
-    components and the integral of its norm. Final values are None for a motion that diverged, at `diverged_at`."""
+    """Return the metrics of a run: for each recorded quantity its largest norm in the last quarter, and for the command the
+    peak of its components and the integral of its norm. Final values are None for a motion that diverged, at
+    `diverged_at`."""
     # No metric here depends on a limit.
     return _meter_of(run).of_recording(run, np.inf)
 
@@ -84,7 +85,7 @@ def _shown(unit: str) -> str:
 
 @cache
 def _note(names: tuple[str, ...]) -> Any:
-    """The equation of the notes; one function for loops that one kernel flies."""
+    """Return the equation of the notes, the same function for all loops that one kernel serves."""
 
     def note(seen: Noted, quantities: Mapping[str, Any], now: Any, limit: Any, last: Any) -> Noted:
         squares = {name: _square(quantities[name]) for name in names}

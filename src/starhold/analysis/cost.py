@@ -1,4 +1,4 @@
-"""The cost of a call of a law: the processor time when the compiled law runs again on the states of a run."""
+"""The cost of a call of a law: its processor time when the compiled law is replayed on the states of a run."""
 
 import time
 
@@ -12,14 +12,14 @@ from starhold.loop.programs import replay
 from starhold.simulation.lane import Recording, recorded
 
 CALLS = 50_000
-"""The most calls timed, as many as for the published table."""
+"""Most calls timed, as many as for the published table."""
 CHUNK = 1e-4
-"""The intended seconds of a timed chunk, long compared with its start; a slow law is timed by fewer calls."""
+"""Intended duration of a timed chunk (s), long compared with its overhead; a slow law is timed with fewer calls."""
 
 
 class Replay:
-    """The compiled calls of a loop's law run again on states (number, numbers of a state): from the measured state to the
-    saturated torque, including models that the law needs, each waiting for the one before. The law's memory carries over
+    """Replays the compiled calls of a loop's law on states (number, numbers of a state): from the measured state to the
+    saturated torque, including models that the law needs, each waiting for the previous one. The law's memory carries over
     from call to call."""
 
     def __init__(self, loop: ClosedLoop, states: NDArray[np.float64]) -> None:
@@ -34,23 +34,22 @@ class Replay:
 
 
 def compile_calls(loop: ClosedLoop) -> tuple[Kernel, ClosedLoop]:
-    """Return the code that repeats the calls of a loop's law, and the loop with what is part of a call."""
-    # The noise of the simulation is no part of one, but for that of readings which the call is given.
+    """Return the code that repeats the calls of a loop's law, and the loop reduced to the parts of a call."""
+    # The simulation's noise is not part of a call, except that of readings which the call receives.
     needed = loop.estimating or getattr(loop.law.module, "WATCHES", False)
     loop = loop.without("random-torque") if needed else loop.without("random-torque", "sensor")
     return make_kernel(replay, loop.composition(), 1, loop.carry(), Numbers.of(loop.phases(1)[0]), passes=True), loop
 
 
 def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float64]:
-    """Return the loop's states at the samples of its recording, for a long one at the first of them (number, numbers of a
-    state)."""
+    """Return the loop's states (number, numbers of a state) at the samples of its recording, at most the first CALLS."""
     carry = loop.carry()
     columns = [recording[name][:CALLS] for name in type(carry.state)._fields]
     others = {name for name, _, _ in recorded(loop)} - {*type(carry.state)._fields}
     for state in carry.effectors:
         for name, value in zip(state._fields, state, strict=True):
             matches = [run for key, run in recording.arrays.items() if key.endswith(name) and key in others]
-            # One that is not recorded stays as it was at the start.
+            # A quantity that is not recorded keeps its initial value.
             start = np.tile(flatten((value,)), (len(columns[0]), 1))
             columns.append(np.reshape(matches[0][:CALLS], start.shape) if matches else start)
     return np.hstack(columns)

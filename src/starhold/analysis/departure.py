@@ -1,5 +1,5 @@
-"""Finds where a flight leaves the claims about its law: where it no longer meets an assumption; claims are about motions
-from a set."""
+"""Finds when a flight leaves the claims about its law: when it no longer meets an assumption, or its motion is outside the
+set of a claim."""
 
 import math
 from collections.abc import Mapping
@@ -30,21 +30,21 @@ from starhold.trace.straight_line import evaluated
 Array: TypeAlias = NDArray[np.float64]
 CHANGES = "the loop, or the law's model of it, changes"
 HELD = {"held-torque", "held-field"}
-"""A claim with one of these is about a torque that is held between samples."""
+"""Assumptions of claims about a torque that is held between samples."""
 LOST = "the motion diverges"
-"""No proof covers this: the motion is too fast for the integration, or beyond the divergence bound."""
+"""The reason when the motion is too fast for the integration, or beyond the divergence bound, which no proof covers."""
 TURNED = "the torque is held while the body, or stored momentum, turns it by {:.2g} rad"
 
 
 class Departure(NamedTuple):
-    """From `time` (s) on a claim does not cover a flight; `how` is a sentence without its full stop that says why."""
+    """The time (s) from which on a claim does not cover a flight; `how` is the reason, a sentence without its full stop."""
 
     time: float
     how: str
 
 
 class Span:
-    """A span is a recorded run between two control steps, and the loop that flies it; unit: its unit of time (s)."""
+    """A recorded run between two control steps, and its loop; unit: its unit of time (s)."""
 
     def __init__(self, loop: ClosedLoop, run: Recording, first: int = 0, last: int | None = None, unit: float = 1.0) -> None:
         every, self.unit = run.attrs["record_every"], unit
@@ -71,15 +71,15 @@ class Span:
         return Measurement(attitude, error_rate, rate, turning, ZERO, ZERO, ZERO, self.loop.period, stored)
 
     def on_limit(self, command: Array) -> Any:
-        """Return at which samples a command, or a part of it (n, components), is saturated."""
+        """Return a mask (n,) of the samples at which a command, or a part of it (n, components), is saturated."""
         return on_limit(command, self.loop.saturation_limit(), self.loop.limit)
 
     def reaches(self, values: Array, limits: Array) -> Any:
-        """Return which values have reached their limits."""
+        """Return a mask of the values that have reached their limits."""
         return values >= limits * ALMOST
 
     def first(self, where: Any, how: str) -> list[Departure]:
-        """Return a departure at the first sample at which a condition (n,) holds; a single boolean is about the first
+        """Return a departure at the first sample at which a condition (n,) holds; a single boolean refers to the first
         sample."""
         places = np.flatnonzero(where)
         return [Departure(float(self["time"][places[0]]) * self.unit, how)] if len(places) else []
@@ -98,9 +98,9 @@ def departures(
     last: int | None = None,
     change: str = CHANGES,
 ) -> dict[str, tuple[Departure, ...]]:
-    """Return for each proved kind of claim about motions how a run leaves it, in order of time; empty where it does not.
-    loop: the certificate's loop, flown from control step `first` until it changes at `last` (None: never), as `change` says.
-    Torque held between samples counts as a departure unless a proof allows it.
+    """Return for each kind of proved claim about motions its departures in a run, in order of time; empty if there are
+    none. loop: the certificate's loop, flown from control step `first` until it changes at `last` (None: never), for the
+    reason `change`. Torque held between samples counts as a departure unless a proof allows it.
     """
     span = Span(loop, run, first, last)
     common = [] if span.changes is None else [Departure(span.changes, change)]
@@ -110,7 +110,7 @@ def departures(
     sampled = certificate.claim("sampling")
     why = reasons.get("" if sampled is None else sampled.outcome, "for which stability is not proved")
     held_too_long = span.first(bool(why), f"the torque is held for {loop.period:g} s, {why}")
-    # Proofs about held torque are about the linear loop at rest, without stored momentum.
+    # Proofs for held torque cover the linear loop at rest, without stored momentum.
     most = _turn_that_counts(loop, sampled)
     held_too_long += span.first(_turned(span) >= most, TURNED.format(most))
     if run.attrs.get("diverged_at") is not None:
@@ -124,7 +124,7 @@ def departures(
 
 
 def _turned(span: Span) -> Array:
-    """Return bounds (n,) of the angle (rad) by which a held torque lags the motion in a control period: the body rotates,
+    """Return bounds (n,) on the angle (rad) by which a held torque lags the motion in a control period: the body rotates,
     and stored momentum rotates its rate."""
     stored = np.linalg.norm(np.broadcast_arrays(*span.shown.wheel_momentum, span["time"])[:3], axis=0)
     precession = stored / float(np.linalg.eigvalsh(tensor(span.loop.craft.inertia))[0])
@@ -132,16 +132,16 @@ def _turned(span: Span) -> Array:
 
 
 def _turn_that_counts(loop: ClosedLoop, sampled: Claim | None) -> float:
-    """Return the angle (rad) from which this rotation matters: one radian, and less where the period is near the longest
-    stable one. A rate of turn phi in a period is damped while the period is below (phi/2)/tan(phi/2) of the longest; a tenth
-    is left for what stiffness adds."""
+    """Return the angle (rad) from which on this rotation matters: one radian, and less if the period is near the longest
+    stable one. A rate that turns by phi in a period is damped while the period is below (phi/2)/tan(phi/2) of the longest;
+    a tenth is reserved for the effect of stiffness."""
     longest = None if sampled is None else sampled.numbers["longest"]
     share = 0.0 if longest is None else min(1.0, 1.1 * loop.period / longest)
     return min(1.0, 3.4 * math.sqrt(1.0 - share))
 
 
 def _left(certificate: Certificate) -> list[Claim]:
-    """Return the claims that a flight can leave: proved ones that are not about the linear motion alone."""
+    """Return the claims that a flight can leave: proved ones, except those about the linear motion."""
     return [claim for claim in certificate.claims if claim.outcome == "proved" and LINEAR not in claim.assumptions]
 
 
@@ -149,7 +149,7 @@ def _left(certificate: Certificate) -> list[Claim]:
 
 
 def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
-    """Return whether a flight starts outside the claim's set, and when it leaves the set."""
+    """Return the departures of a flight that starts outside the claim's set, or leaves it."""
     left = [*_away(claim, span), *_misled(claim, span), *_swinging(claim, span), *_unplanned(claim, programs, span)]
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
@@ -157,8 +157,8 @@ def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departur
         left += span.first(total > momentum * (1.0 + 1e-9), "the total momentum exceeds the stated bound")
     if "rates" in claim.numbers:
         turned = np.linalg.norm(span["rate"], axis=1) > claim.numbers["rates"][0]
-        left += span.first(turned, "it turns faster than the claim is about")
-    # V is at most `start` at the start, and `level` from then on; None for no bound.
+        left += span.first(turned, "it turns faster than the claim covers")
+    # V is at most `start` at the start, and at most `level` from then on; None for no bound.
     start = claim.numbers.get("start")
     level = claim.numbers.get("level", start)
     value = None if start is None or level is None else height_of(claim, span.loop, span.shown)
@@ -166,12 +166,12 @@ def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departur
         return left
     if value[0] > start:
         return [*left, *span.first(True, "it is outside the set")]
-    # The integration lets V of a motion along the border rise by its own error.
+    # Integration errors may increase V of a motion along the border.
     return [*left, *span.first(value > cast(float, level) * (1.0 + 1e-6), "it leaves the set")]
 
 
 def _away(claim: Claim, span: Span) -> list[Departure]:
-    """Return when a flight that should be near its target is farther away."""
+    """Return the departure of a flight that exceeds the ultimate bound of a claim."""
     settling = claim.numbers.get("settling")
     if settling is None:
         return []
@@ -181,19 +181,19 @@ def _away(claim: Claim, span: Span) -> list[Departure]:
 
 
 def _swinging(claim: Claim, span: Span) -> list[Departure]:
-    """Return whether a flight starts with appendages that move more than the claim is about."""
+    """Return the departures of a flight that starts with appendages moving more than the claim covers."""
     if "begun" not in claim.numbers:
         return []
     states = recorded_states(span.loop, span.arrays)
     if states is None:
-        return span.first(True, "how far its appendages move is not recorded")
+        return span.first(True, "the motion of its appendages is not recorded")
     far = bool((np.abs(states[0]) > claim.numbers["begun"]).any())
-    return span.first(far, "its appendages move more than the claim is about")
+    return span.first(far, "its appendages move more than the claim covers")
 
 
 def _unplanned(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
-    """Return when the command is farther from the best plan's than is claimed, where the law is told the state as recorded
-    and the target rests."""
+    """Return the departures at which the command differs from that of the best plan by more than is claimed, if the law
+    gets the recorded state and the target is at rest."""
     loop, off = span.loop, claim.numbers.get("plan_error")
     if off is None or loop.used("sensor") or loop.used("estimator") or loop.target.part.name != "inertial":
         return []
@@ -203,14 +203,14 @@ def _unplanned(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[De
 
 
 def _misled(claim: Claim, span: Span) -> list[Departure]:
-    """Return when the estimation error exceeds the bound claimed for a share of flights, as it does before the estimator
-    settles."""
+    """Return the departures at which the estimation error exceeds the bound claimed for a share of flights, as it does
+    before the estimator settles."""
     how = "the estimation error exceeds the stated bound"
     return [one for far in _misreadings(claim, span) for one in span.first(far, how)]
 
 
 def _misreadings(claim: Claim, span: Span) -> list[Array]:
-    """Return for each estimate at which samples its error exceeds the bound claimed for a share of flights."""
+    """Return for each estimate a mask of samples at which its error exceeds the bound claimed for a share of flights."""
     if not claim.numbers.get("share"):
         return []
     misread = list[Array]()
@@ -225,8 +225,8 @@ def _misreadings(claim: Claim, span: Span) -> list[Array]:
 def covered(
     certificate: Certificate, loop: ClosedLoop, run: Recording, first: int = 0, last: int | None = None
 ) -> tuple[float, float] | None:
-    """Return the times (s) between which the claim about the loop as it flies covers a run: it begins once the estimate has
-    settled and the motion is in its set. None where it is not proved, or never covers the run. loop, first, last: as in
+    """Return the times (s) between which the claim about the loop as it flies covers a run: from when the estimate has
+    settled and the motion is in the set. None if it is not proved, or never covers the run. loop, first, last: as in
     `departures`."""
     claim, span = certificate.claim("pointing"), Span(loop, run, first, last)
     if claim is None or claim.outcome != "proved" or not len(span["time"]):
@@ -245,7 +245,7 @@ def covered(
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     """Return whether the loop starts in the sets of the proved claims about a level of V."""
-    # The true start, not as measured.
+    # The true initial state, not the measured one.
     loop, inside = loop.without("sensor", "estimator"), dict[str, bool]()
     shown = shown_at(loop, loop.start)
     momentum = momentum_of(loop, shown)
@@ -261,13 +261,13 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
 
 
 def measured_at(loop: ClosedLoop, state: Any) -> Any:
-    """Return the measurement at a state as a flight begins, before the sign policy; numbers may be columns (n,)."""
+    """Return the measurement at an initial state of a flight, before the sign policy; numbers may be columns (n,)."""
     carry = loop.carry()._replace(state=state)
     return make_step(loop.composition()).measure(carry, 0, 0, loop.craft, loop.setup())
 
 
 def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
-    """Return what the law is given at a state as a flight begins; numbers may be columns (n,)."""
+    """Return the law's measurement at an initial state of a flight; numbers may be columns (n,)."""
     shown = measured_at(loop, state)
     error = np.array(shown.attitude)
     attitude: Any = tuple(fed_back(loop, np.atleast_2d(error.T)).T.reshape(error.shape))
@@ -286,7 +286,7 @@ def height_of(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
 
 
 def value_of(programs: Mapping[str, Any], loop: ClosedLoop, shown: Measurement) -> Any:
-    """Return V at measurements, whose numbers may be columns, less V at rest on target; s.Js/2 where a surface s is reached.
+    """Return V at measurements, whose numbers may be columns, minus V at rest on target; s.Js/2 for a law with a surface s.
     None without either."""
     if "surface" in programs:
         s: Any = tuple(evaluated(programs["surface"], measurement=shown, gains=loop.gains))
@@ -307,7 +307,7 @@ def momentum_of(loop: ClosedLoop, shown: Measurement) -> Any:
 
 
 def fed_back(loop: ClosedLoop, error: Array) -> Array:
-    """Return the law's quaternions (n, 4) without noise, from the true errors (n, 4)."""
+    """Return the quaternions (n, 4) that the law feeds back without noise, from the true errors (n, 4)."""
     if loop.sign_policy == "as_published":
         return error
     if loop.sign_policy == "shortest":

@@ -1,4 +1,4 @@
-"""Metrics of a craft that holds a point or a circle near a libration point, all in SI units."""
+"""Metrics of station keeping at a point or on a circle near a libration point, all in SI units."""
 
 import math
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from starhold.parts.bodies.libration_point import Units
 from starhold.simulation.lane import Recording
 
 DAY, YEAR = 86_400.0, 365.25 * 86_400.0
-"""Seconds."""
+"""Day and year in seconds."""
 
 
 class CircleGoal(NamedTuple):
@@ -27,7 +27,7 @@ class CircleGoal(NamedTuple):
     rate: float
 
     def at(self, phase: float) -> tuple[Vector, Vector]:
-        """Position and velocity on it at a phase from Y towards Z (rad)."""
+        """Return position and velocity on the circle at a phase from Y towards Z (rad)."""
         y, z = self.radius * math.cos(phase), self.radius * math.sin(phase)
         return (0.0, y, z), (0.0, -self.rate * z, self.rate * y)
 
@@ -42,7 +42,7 @@ class EquilibriumGoal(NamedTuple):
     place: Vector
 
     def at(self, phase: float) -> tuple[Vector, Vector]:
-        """Position and velocity there, whatever the phase."""
+        """Return its position and zero velocity, for any phase."""
         return self.place, ZERO
 
     def distance(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -51,8 +51,8 @@ class EquilibriumGoal(NamedTuple):
 
 
 def goal_of(gains: Any) -> CircleGoal | EquilibriumGoal:
-    """Return a law's target from its gains: a circle of this radius and rate, else an equilibrium at this y and z, or at the
-    libration point."""
+    """Return a law's target from its gains: a circle if they have radius and rate, else an equilibrium at their y and z, or
+    at the libration point."""
     if hasattr(gains, "radius") and hasattr(gains, "rate"):
         return CircleGoal(gains.radius, gains.rate)
     return EquilibriumGoal((0.0, getattr(gains, "y", 0.0), getattr(gains, "z", 0.0)))
@@ -69,7 +69,7 @@ MEASURES: dict[str, Measure] = {
     "limit_share": Measure("on limit", "%", "share of the time with the control on its limit", 100.0),
     "peak_control": Measure("peak control", "µm/s²", "largest norm of the control", 1e6),
     "peak_ratio": Measure(
-        "peak / limit", "%", "the largest norm, or component where each axis has the limit, over it", 100.0
+        "peak / limit", "%", "the largest norm, or component if each axis is limited, over the limit", 100.0
     ),
     "effort_per_year": Measure("delta-v a year", "m/s", "integral of |u|, for a year of 365.25 days"),
 }
@@ -77,7 +77,7 @@ MEASURES: dict[str, Measure] = {
 
 
 class Goal(NamedTuple):
-    """The numbers of the notes, scaled: the radius of the circle or the equilibrium, the distance that counts as near, and
+    """Arguments of the notes, scaled: the radius of the circle or the equilibrium, the distance that counts as near, and
     the last instant."""
 
     radius: float
@@ -87,9 +87,9 @@ class Goal(NamedTuple):
 
 
 class Noted(NamedTuple):
-    """Notes on a lane: the last instant not near; sums of the control's norm and of instants on the limit; the least and the
-    largest radius since the middle; and for a window the largest square of the distance, error of the radius, |x|, and
-    square of the control."""
+    """Notes on a lane: the last instant not near; sums of the control's norm and of instants on the limit; the least and
+    the largest radius in the second half; and per window the largest squared distance, radius error, |x|, and squared
+    control."""
 
     outside: float
     total: float
@@ -105,7 +105,7 @@ class Noted(NamedTuple):
 def make_meter(
     steps: int, period: float, limit: str, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float
 ) -> Meter:
-    """The meter of flights of `steps` control periods (scaled), or of as many samples at such intervals, in SI.
+    """Return the meter of flights of `steps` control periods (scaled), or of as many samples at such intervals, in SI.
 
     limit: how the control is limited; tolerance: scaled distance that counts as near."""
     circle = isinstance(goal, CircleGoal)
@@ -138,15 +138,15 @@ def make_meter(
     flown = steps * period * units.time
     yearly = (period * units.velocity, YEAR / flown if flown > 0.0 else math.nan)
     table["effort_per_year"] = Metric("m/s", "number", (rows.total,), yearly)
-    # The radius, noted late, matters only for circles, which have no later mark.
+    # The radius, noted in the second half, matters only for circles, which have no later mark.
     marks = (half,) if circle else (half, tail)
     early, late = (_note(limit, circle, since) for since in (False, True))
     return Meter(first, given, (early, late), table, windows, steps, period * units.time, marks)
 
 
 def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float) -> dict[str, Any]:
-    """Return the metrics of a run of `simulate`; `tolerance` (scaled) is the distance within which it has settled. Times
-    that are never reached are None, as are all final values of a motion that diverged; `diverged_at` (s) is None for one
+    """Return the metrics of a run of `simulate`; `tolerance` (scaled) is the distance that counts as settled. Times that
+    are never reached are None, as are all final values of a motion that diverged; `diverged_at` (s) is None for a motion
     that did not; `cut_off` names a time that is None because it lies within the last quarter of the run."""
     limit, kind = float(run.attrs["control_limit"]), run.attrs["limit"]
     period = run.attrs["control_period"] * run.attrs["record_every"]
@@ -159,7 +159,7 @@ def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, to
 
 @cache
 def _note(limit: str, circle: bool, late: bool) -> Any:
-    """Return the equation of the notes, before the last mark or from it on; one function for loops that one kernel flies."""
+    """Return the equation of the notes, before the last mark or from it on; the same for all loops of one kernel."""
 
     def note(seen: Noted, quantities: Mapping[str, Any], now: Any, most_command: Any, goal: Goal) -> Noted:
         position, control, command = quantities["position"], quantities["control"], quantities["command"]
@@ -186,7 +186,7 @@ def _note(limit: str, circle: bool, late: bool) -> Any:
 
 
 def _units() -> dict[str, str]:
-    """The metrics with their SI units."""
+    """Return the SI units of the metrics."""
     goals = CircleGoal(0.0, 0.0), EquilibriumGoal(ZERO)
     units = {"diverged_at": "s", "peak_ratio": "1", **COSTS}
     for goal in goals:

@@ -1,5 +1,5 @@
-"""Compares claims about laws near a libration point with flights: when and how a flight leaves them, whether a start lies in
-their sets, and flights from random states of a certified set, which test the certifier and are not part of a proof."""
+"""Compares claims about laws near a libration point with flights: departures of a flight, whether a start lies in the
+claimed sets, and flights from random states of a certified set, which test the certifier and are not part of a proof."""
 
 import math
 from collections.abc import Mapping
@@ -19,16 +19,16 @@ from starhold.simulation.lane import Recording
 from starhold.trace.straight_line import evaluated
 
 SLACK = 1e-6
-"""The integration error of V, scaled distances and velocities in a motion along a border."""
+"""Allowance for the integration error of V, scaled distances and velocities along a border."""
 PERIOD = 1e-4
-"""Control with this period (scaled) counts as continuous."""
+"""The control period (scaled) that counts as continuous control."""
 FLOOR = 1e-6
-"""The share of V at the centre of the circle by which held control perturbs zero."""
+"""The disturbance of V = 0 by held control, as a share of V at the centre of the circle."""
 
 
 def departures(certificate: Certificate, loop: ClosedLoop, run: Recording, unit: float) -> dict[str, tuple[Departure, ...]]:
-    """Return for each proved kind of claim how a run leaves it, in order of time; empty where it does not. unit: of time, in
-    s."""
+    """Return for each kind of proved claim its departures in a run, in order of time; empty if there are none. unit: of
+    time, in s."""
     span, at = Span(loop, run, unit=unit), run.attrs.get("diverged_at")
     common = [] if at is None else [Departure(at * unit, LOST)]
     by_kind: dict[str, tuple[Departure, ...]] = {}
@@ -47,8 +47,8 @@ def outside(
     velocity: NDArray[np.float64],
     slack: float = 0.0,
 ) -> Any:
-    """Return which states, (3, n) each, lie outside a claim's set by more than a slack, (n,); none for a claim about all
-    states."""
+    """Return a mask (n,) of the states, (3, n) each, that lie outside a claim's set by more than a slack; none for a claim
+    about all states."""
     numbers, beyond = claim.numbers, np.zeros(position.shape[1], dtype=bool)
     if "level" in numbers:
         value = value_of(claim.programs, loop, position, velocity)
@@ -59,7 +59,7 @@ def outside(
         steep = math.sqrt(loop.craft.rate**2 + 2.0 * loop.craft.stiffness)
         beyond |= np.abs(position[0] + velocity[0] / steep) > numbers["width"] * (1.0 + slack)
         beyond |= np.abs(position[0]) > numbers["reach"] * (1.0 + slack)
-        # The claim assumes that Y and Z are held; it does not cover a flight that starts otherwise.
+        # The claim assumes that Y and Z are at their equilibrium; it does not cover a flight that starts otherwise.
         beyond |= abs(position[1:, 0] - (loop.gains.y, loop.gains.z)).max() + abs(velocity[1:, 0]).max() > slack
     return beyond
 
@@ -74,8 +74,9 @@ def value_of(
 
 
 def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHTS, seed: int = 1) -> Trial | None:
-    """Fly from states of the circle's certified set; None where that is not proved. Raises BrokenClaimError."""
-    # A claim within limits comes after the other, and is about a smaller set.
+    """Fly from states of the circle's certified set, and return the trial; None if the claim is not proved. Raise
+    BrokenClaimError if a flight contradicts it."""
+    # A claim within limits comes after the other, and has a smaller set.
     claim = next((c for c in reversed(_proved(certificate)) if "level" in c.numbers), None)
     if claim is None:
         return None

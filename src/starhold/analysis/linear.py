@@ -23,22 +23,22 @@ from starhold.parts.contract import IS_VALID
 Array = NDArray[np.float64]
 AXES = "xyz"
 ERROR = tuple(f"{name}_{axis}" for name in ("theta", "rate") for axis in AXES)
-"""The states that every plant begins with: the error's rotation vector (rad), twice the quaternion's vector part, and the
-rate relative to the target (rad/s), body axes."""
+"""The first states of every plant: the error's rotation vector (rad), twice the quaternion's vector part, and the rate
+relative to the target (rad/s), body axes."""
 COMMAND = tuple(f"command_{axis}" for axis in AXES)
 DISTURBANCE = tuple(f"disturbance_{axis}" for axis in AXES)
 MOST_HELD = 1000
 """The longest delay in control periods."""
 CALLS, SOLVED = 30, 10
-"""The number of calls of the law at rest for its memory to settle, and of solutions for what then still changes."""
+"""Calls of the law at rest in which its memory settles, and linear solutions for numbers that still change."""
 LONG = 2**40
-"""The number of calls after which changes must have died out."""
+"""The number of calls after which transients must have decayed."""
 SETTLED = 1e-9
-"""A number has settled once a call changes it by less than this part of its largest change."""
+"""A number has settled once a call changes it by less than this share of its largest change."""
 
 
 class LinearityError(ValueError):
-    """A loop has no linear form near rest on target; the text says why."""
+    """A loop has no linear form near rest on target; the message says why."""
 
 
 class System(NamedTuple):
@@ -62,7 +62,7 @@ class System(NamedTuple):
         return self.C @ np.linalg.solve(points[:, None, None] * np.eye(size) - self.A, self.B.astype(complex)) + self.D
 
     def take(self, inputs: tuple[str, ...]) -> System:
-        """Return the system with these of its inputs."""
+        """Return the system with only these inputs."""
         places = [self.inputs.index(name) for name in inputs]
         return self._replace(B=self.B[:, places], D=self.D[:, places], inputs=inputs)
 
@@ -70,11 +70,11 @@ class System(NamedTuple):
 @dataclass(frozen=True)
 class Linear:
     """A linear loop: the plant from command and disturbance (N m, body axes) to its states, the law from these to the
-    command, in continuous time and sampled.
+    command, in continuous time and as sampled.
 
-    Continuous: `plant`, `law` (for a law with memory its differences divided by the period). Sampled: `stepped`, exact for a
-    command that is held for a period and acts `delay` (s) later, and for a held disturbance, and `stepped_law`. `left_out`
-    names parts of the loop that the matrices lack."""
+    Continuous: `plant`, `law` (for a law with memory, its differences divided by the period). Sampled: `stepped`, exact for
+    a command that is held for a period and acts `delay` (s) later, and for a held disturbance, and `stepped_law`.
+    `left_out` names parts of the loop that the matrices omit."""
 
     plant: System
     law: System
@@ -90,7 +90,7 @@ class Linear:
 
     @cached_property
     def stepped_loop(self) -> System:
-        """The sampled loop, cut at the command, from a command to the negative of the law's answer."""
+        """The sampled loop, opened at the command: from a command to the negative of the law's response."""
         return in_series(self.stepped, self.stepped_law)
 
     @cached_property
@@ -100,25 +100,25 @@ class Linear:
 
     @property
     def poles(self) -> Array:
-        """The eigenvalues of a step of the closed loop, the largest first."""
+        """The eigenvalues of the sampled closed loop, the largest first."""
         roots: Any = np.linalg.eigvals(self.stepped_closed.A)
         return roots[np.lexsort((roots.imag, -np.round(np.abs(roots), 12)))]
 
     @property
     def is_stable(self) -> bool:
-        """Whether all of them lie inside the unit circle, by floating point."""
+        """Whether all poles lie inside the unit circle, in floating point."""
         return bool(np.abs(self.poles).max() < 1.0)
 
 
 def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
-    """Return the linear loop near rest on target, with the target fixed where it is at the start. delay: from the control
-    instant until the command acts (s). LinearityError where there is none."""
+    """Return the linear loop near rest on target, with the target fixed at its initial attitude. delay: from the control
+    instant until the command acts (s). Raise LinearityError if there is none."""
     if not 0.0 <= delay <= MOST_HELD * loop.period:
         raise LinearityError(f"a delay between 0 and {MOST_HELD} control periods is wanted, not {delay:g} s")
     if not loop.aims:
         raise LinearityError("the body has no attitude")
     for one in (loop.law, *(f.part for f in loop.used("effector") if f.part.flag("ACTS"))):
-        # Without an estimator, what it would tell of itself is always valid.
+        # Without an estimator, `is_valid` is always 1.
         if others := [name for name in one.reads if name != IS_VALID]:
             readings = " and the ".join(name.replace("_", " ") for name in others)
             raise LinearityError(f"{one.name} also uses the {readings}, not attitude and rate alone")
@@ -128,7 +128,7 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
         with np.errstate(all="ignore"):
             plant, law = _matrices(still)
     except ArithmeticError:
-        # Also a division by zero.
+        # This includes a division by zero.
         raise LinearityError(
             f"the law {loop.law.name}, or a part of the loop, has no derivative at rest on target"
         ) from None
@@ -142,8 +142,8 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
 
 
 def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
-    """Return the loop at rest on target, in inertial axes equal to the target's, so that the error is exactly zero; append
-    to `left_out` the names of removed parts."""
+    """Return the loop at rest on target, with inertial axes equal to the target's, so that the error is exactly zero;
+    append the names of omitted parts to `left_out`."""
     counted = loop.law.counters(loop.law.remember(loop.gains, loop.known, loop.period))
     if counted is not None or buffers(loop.carry().memory):
         raise LinearityError(f"the law {loop.law.name} iterates, and has no derivative")
@@ -172,8 +172,8 @@ def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
 
 
 def _settled(loop: ClosedLoop, step: Step, setup: Setup) -> Carry:
-    """Return the carry with the law's memory after a long time at rest on target, beyond its start-up. LinearityError where
-    its memory does not settle."""
+    """Return the carry with the law's memory after a long time at rest on target, after its start-up. Raise LinearityError
+    if its memory does not settle."""
     carry = loop.carry()
 
     def called(numbers: Any) -> list[Any]:
@@ -197,13 +197,13 @@ def _settled(loop: ClosedLoop, step: Step, setup: Setup) -> Carry:
 
 
 def _with_memory(carry: Carry, numbers: Any) -> Carry:
-    """Return a carry whose law remembers these numbers."""
+    """Return a carry in which the law's memory has these numbers."""
     given = iter(numbers)
     return carry._replace(memory=mapped(carry.memory, lambda _: next(given)))
 
 
 def _matrices(loop: ClosedLoop) -> tuple[System, System]:
-    """Return the plant in continuous time and the law in steps, with all states."""
+    """Return the plant in continuous time and the sampled law, with all states."""
     step, setup = make_step(loop.composition()), loop.setup()
     carry = _settled(loop, step, setup)
     lags = any(fitted.part.hook("rates") is not None for fitted in loop.used("actuator"))
@@ -253,7 +253,7 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
 
 
 def _filled(rates: Any, states: Any) -> list[Any]:
-    """Return the rates of states, 0 where a part has none."""
+    """Return the rates of states, 0 for parts without rates."""
     numbers: list[Any] = []
     for rate, state in zip(rates or (None,) * len(states), states, strict=True):
         values = flatten((state,))
@@ -271,8 +271,8 @@ def _flat(rate: Any, state: Any) -> list[Any]:
 
 
 def _needed(plant: System, law: System) -> tuple[System, System]:
-    """Return plant and law without irrelevant states: states of the plant that nothing depends on, such as the momenta of
-    wheels without friction; memory that the command does not depend on; and states that never change, such as flags."""
+    """Return plant and law without irrelevant states: states of the plant on which nothing depends, such as the momenta of
+    wheels without friction; memory on which the command does not depend; and states that never change, such as flags."""
     law = _remembered(law)
     feeds = plant.A != 0.0
     heard = (law.D != 0.0).any(axis=0) | (law.B != 0.0).any(axis=0)
@@ -291,7 +291,7 @@ def _needed(plant: System, law: System) -> tuple[System, System]:
 
 
 def _remembered(law: System) -> System:
-    """Return the law without memory that its command does not depend on, or that never changes."""
+    """Return the law without memory on which its command does not depend, or that never changes."""
     size = len(law.states)
     constant = (np.eye(size) == law.A).all(axis=1) & (law.B == 0.0).all(axis=1)
     needed = (law.C != 0.0).any(axis=0)
@@ -303,8 +303,8 @@ def _remembered(law: System) -> System:
 
 
 def sampled(plant: System, period: float, delay: float = 0.0) -> System:
-    """Discretize a plant exactly, under a command that is held for a period and acts `delay` (s) later, and a held
-    disturbance. Pending commands are states (Astrom and Wittenmark, Computer-Controlled Systems, 1997).
+    """Return the exact discretisation of a plant for a command that is held for a period and acts `delay` (s) later, and a
+    held disturbance. Pending commands are states (Astrom and Wittenmark, Computer-Controlled Systems, 1997).
     """
     size = len(plant.states)
     whole = int(np.floor(delay / period * (1.0 + 1e-12)))
@@ -338,7 +338,7 @@ def sampled(plant: System, period: float, delay: float = 0.0) -> System:
 
 
 def _under_hold(plant: System, time: float) -> tuple[Array, Array]:
-    """Return the matrices by which the states and held inputs give the states after a time (s)."""
+    """Return the matrices that map states and held inputs to the states after a time (s)."""
     size, inputs = plant.B.shape
     whole = np.zeros((size + inputs, size + inputs))
     whole[:size] = np.hstack([plant.A, plant.B])
@@ -347,7 +347,7 @@ def _under_hold(plant: System, time: float) -> tuple[Array, Array]:
 
 
 def in_series(plant: System, law: System) -> System:
-    """Return the loop cut at the command: from a command to the negative of the law's answer."""
+    """Return the loop opened at the command: from a command to the negative of the law's response."""
     plant = plant.take(COMMAND)
     A = np.block([[plant.A, np.zeros((len(plant.states), len(law.states)))], [law.B @ plant.C, law.A]])
     B = np.vstack([plant.B, law.B @ plant.D])

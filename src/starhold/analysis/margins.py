@@ -1,4 +1,4 @@
-"""Gain, phase and delay margins of a linear loop about each body axis, read off its sampled frequency response."""
+"""Gain, phase and delay margins of a linear loop about each body axis, from its sampled frequency response."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -12,18 +12,18 @@ from starhold.analysis.linear import AXES, Linear
 POINTS = 600
 """The number of frequencies of a response."""
 BELOW = 1e-2
-"""The lowest frequency, as a fraction of that of the slowest pole of the closed loop."""
+"""The lowest frequency, as a fraction of that of the slowest closed-loop pole."""
 
 
 UNITS = {"gain": "1", "less": "1", "phase": "rad", "delay": "s", "crossover": "rad/s", "sensitivity": "1"}
 
 
 class Margins(NamedTuple):
-    """The margins of the loop about one axis, with the others closed. gain: the least factor above 1 of the command that
-    loses stability (inf for none); less: the greatest factor below 1 that does (0 for none); phase (rad) and delay (s): the
-    least further lag that does (inf for none); crossover: the highest frequency (rad/s) at which the loop's gain is 1, its
-    bandwidth (NaN for none); sensitivity: the largest |1/(1 + L)|, whose inverse is the least distance of L from -1. All but
-    the crossover are NaN where the loop is not stable."""
+    """The margins of the loop about one axis, with the others closed. gain: the least factor above 1 on the command that
+    loses stability (inf for none); less: the largest factor below 1 that does (0 for none); phase (rad) and delay (s): the
+    least additional lag that does (inf for none); crossover: the highest frequency (rad/s) at which the loop gain is 1, its
+    bandwidth (NaN for none); sensitivity: the peak of |1/(1 + L)|, whose inverse is the least distance of L from -1. All
+    except the crossover are NaN if the loop is not stable."""
 
     axis: str
     gain: float
@@ -48,7 +48,7 @@ class Response(NamedTuple):
 
 def response(linear: Linear) -> Response:
     """Return the frequency response of the loop opened about one axis, with the others closed."""
-    # A pole of z is exp(s period); of a loop that waits some are zero.
+    # A pole z is exp(s period); some poles of a loop with delay are zero.
     turns = [abs(np.log(pole)) / linear.period for pole in linear.poles.astype(complex) if abs(pole) > 1e-9]
     highest = math.pi / linear.period
     slowest = min((turn for turn in turns if turn > 0.0), default=highest)
@@ -71,7 +71,7 @@ def _cut(linear: Linear, frequencies: Any, axes: Iterable[int]) -> NDArray[np.co
 
 
 def margins(linear: Linear, shown: Response | None = None) -> list[Margins]:
-    """Return the margins about the three body axes; shown: the response, where it is known already."""
+    """Return the margins about the three body axes; shown: the response, if it is already known."""
     measured = response(linear) if shown is None else shown
     return [_about(linear, k, measured) for k in range(3)]
 
@@ -89,7 +89,7 @@ def _about(linear: Linear, k: int, measured: Response) -> Margins:
     crossover = max(crossings, default=math.nan)
     if not linear.is_stable:
         return Margins(AXES[k], math.nan, math.nan, math.nan, math.nan, crossover, math.nan)
-    # Where L is real and negative; at half the sampling frequency it is always real.
+    # Frequencies at which L is real and negative; at half the sampling frequency it is always real.
     reals = [at(f) for f in _roots(w, L.imag, lambda f: along(f).imag)] + [complex(L[-1])]
     gains = [-1.0 / value.real for value in reals if value.real < 0.0]
     lags = [((math.pi + np.angle(at(f))) % (2.0 * math.pi), f) for f in crossings]
@@ -105,18 +105,18 @@ def _about(linear: Linear, k: int, measured: Response) -> Margins:
 
 
 def _log_size(values: Any) -> Any:
-    """Return the logarithm of the modulus of numbers; some may be 0, because a law need not act about every axis."""
+    """Return the logarithm of the modulus of numbers, which may be 0, because a law need not act about every axis."""
     return np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
 
 
 def _roots(w: Any, values: Any, function: Callable[[Any], Any]) -> list[float]:
-    """Return the frequencies at which a function, of many frequencies at once, changes sign between two of w, except jumps,
-    as across an undamped resonance."""
+    """Return the frequencies between neighbours in w at which a vectorised function changes sign, except at jumps, as
+    across an undamped resonance."""
     roots: list[float] = []
     for p in np.flatnonzero((values[:-1] < 0.0) != (values[1:] < 0.0)):
         low, high = w[p], w[p + 1]
         while high - low > 1e-12 * high:
-            # Many are as fast as one.
+            # Evaluating many frequencies is as fast as one.
             inner = np.linspace(low, high, 65)
             place = int(np.argmax((function(inner[1:]) < 0.0) != (values[p] < 0.0)))
             low, high = inner[place : place + 2]

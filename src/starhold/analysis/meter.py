@@ -1,7 +1,7 @@
 """Metrics of flights: notes (accumulated numbers) that an equation takes at each control instant, and the metrics computed
 from them at the end. The same notes are taken inside a kernel, for many flights at once without storing samples, and from a
-recording, whose samples are the instants. A row of a table says how a metric follows from the notes; the report's page reads
-that table too.
+recording, whose samples are the instants. A row of a table defines how a metric follows from the notes; the report's page
+reads that table too.
 """
 
 import itertools
@@ -27,25 +27,25 @@ from starhold.simulation.lane import Recording
 from starhold.trace.program import Program
 
 TOLD = "told."
-"""Begins the names of the quantities that the law is given, as sensors or its estimator report them."""
+"""Prefix of the names of the quantities that the law gets from sensors or its estimator."""
 LAST = 0.25
 """The share of the run over which chatter and the final error are measured."""
 ALMOST = 1.0 - 1e-9
-"""The share of a limit from which it counts as reached."""
+"""The share of a limit from which on it counts as reached."""
 KEPT = 0.1
-"""The share of the run at its end in which nothing counts as settled: an oscillating motion, or one that would leave again
-in a longer run, may be within its bounds there by chance."""
+"""The last share of the run, in which nothing counts as settled: an oscillating motion, or one that would leave again in a
+longer run, may be within its bounds there by chance."""
 
 
 def stays_within(values: Any, bound: float) -> int | None:
-    """Return the index from which all values are at most the bound, or None."""
+    """Return the index from which on all values are at most the bound, or None."""
     outside = np.flatnonzero(~(np.asarray(values) <= bound))
     first = int(outside[-1]) + 1 if outside.size else 0
     return first if first < len(values) else None
 
 
 def on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.bool_]:
-    """Return which samples (n, components) are on their limit; none where there is no limit."""
+    """Return a mask (n,) of the samples (n, components) that are on their limit; none without a limit."""
     if kind == "none" or not np.isfinite(limit):
         return np.zeros(len(u), dtype=bool)
     size = np.linalg.norm(u, axis=1) if kind == "norm" else np.abs(u).max(axis=1)
@@ -54,7 +54,7 @@ def on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.bool
 
 Array: TypeAlias = NDArray[np.float64]
 Metrics: TypeAlias = dict[str, Array]
-"""Metrics by name, (lanes,), NaN where one has no value."""
+"""Metrics by name, (lanes,), NaN for no value."""
 Columns: TypeAlias = tuple[tuple[str, tuple[int, ...]], ...]
 """Recorded quantities by name, with the shape of a sample: () or (components,)."""
 Note: TypeAlias = Callable[[Any, Mapping[str, Any], Any, Any, Any], Any]
@@ -64,12 +64,12 @@ Note: TypeAlias = Callable[[Any, Mapping[str, Any], Any, Any, Any], Any]
 WINDOWS = 40
 """The approximate number of time windows of envelopes."""
 PIECE = 2**16
-"""The number of samples of a recording that are copied and noted at once."""
+"""The number of samples of a recording that are copied and processed at once."""
 
 
 class Window(NamedTuple):
-    """A quantity whose largest value in each window of time makes an envelope over the runs: its index among the notes,
-    which restart in each window, a function from the noted number to the quantity, its meaning, and its unit."""
+    """A quantity whose largest value in each window of time gives an envelope over the runs: its index among the notes,
+    which restart in each window, a function from the note to the quantity, its meaning, and its unit."""
 
     row: int
     value: Callable[[Array], Array]
@@ -78,12 +78,12 @@ class Window(NamedTuple):
 
 
 class Metric(NamedTuple):
-    """A metric in its unit is computed from the notes at `rows` by the rule `kind`, multiplied by `times` in order.
+    """A metric, computed from the notes at `rows` by the rule `kind`, multiplied by the factors `times` in order.
 
-    over: the count of instants it is a mean over, "samples" or "tail" (changes between those of the last quarter), with a
-    factor; since: the rows are of windows, and the largest counts from here on, "start", "half" or "tail"; final: it
-    describes the end of a flight, so that one that diverges has none; kept: the share of the flight, at its end, in which
-    nothing counts as settled."""
+    over: the number of instants for a mean, "samples" or "tail" (changes between those of the last quarter), with a factor;
+    since: the rows are of windows, and the metric is the maximum from "start", "half" or "tail" on; final: it describes the
+    end of a flight, so a flight that diverges has none; kept: the last share of the flight, in which nothing counts as
+    settled."""
 
     unit: str
     kind: str
@@ -101,17 +101,18 @@ TIMES = (INSTANT, CROSSING)
 KINDS: Mapping[str, Callable[..., Array]] = {
     "number": lambda x: x,
     "root": np.sqrt,
-    # From the square of the sine of half the angle.
+    # From the squared sine of half the angle.
     "angle": lambda x: 2.0 * np.arcsin(np.sqrt(np.minimum(x, 1.0))),
-    # From the square of the distance between the ends of two unit vectors.
+    # From the squared distance between the ends of two unit vectors.
     "apart": lambda x: 2.0 * np.arcsin(0.5 * np.sqrt(x)),
     # From two vectors.
     "distance": lambda *x: np.sqrt(sum((a - b) ** 2 for a, b in zip(x[:3], x[3:], strict=True))),
-    # From the initial angle, and the share of it beyond the target; a start on target has none.
+    # From the initial angle, and the share of it beyond the target; zero for a start on target.
     "overshoot": lambda a, b, c, x: np.where(a**2 + b**2 + c**2 < 1e-18, 0.0, np.maximum(x, 0.0)),
-    # The time from which values stay within their bounds, from the last instants outside (-1: never).
+    # The time from which on values stay within their bounds, from the last instants outside (-1: never).
     INSTANT: lambda *x: np.maximum.reduce(x) + 1.0,
-    # The same between instants, from two numbers that are at most 1 within their ends, and when each last came to its end.
+    # The same, interpolated between instants, from two numbers that are at most 1 within their bounds, and the times at
+    # which each last reached its bound.
     CROSSING: lambda a, b, *x: np.where((a > 1.0) | (b > 1.0), np.inf, np.maximum.reduce(x)),
     "most": lambda *x: np.maximum.reduce(x),
 }
@@ -120,10 +121,10 @@ KINDS: Mapping[str, Callable[..., Array]] = {
 
 @dataclass(frozen=True)
 class Meter:
-    """The notes to be taken of flights, and the metrics computed from them. first: before a flight; numbers: arguments of
-    the notes; notes: the equation before the last of `marks`, and from it on; table: metrics by name; windows: quantities of
-    envelopes by name; steps: control steps of a flight, of `instant` seconds each (or of the body's own unit of time, where
-    that is unknown); marks: instants at which windows must end, in order."""
+    """The notes to take of flights, and the metrics computed from them. first: the notes before a flight; numbers:
+    arguments of the notes; notes: the equations before the last of `marks`, and from it on; table: metrics by name;
+    windows: quantities of envelopes by name; steps: control steps of a flight, of `instant` seconds each (or in the body's
+    own unit of time, if that is unknown); marks: instants at which windows must end, in order."""
 
     first: Any
     numbers: Any
@@ -149,13 +150,13 @@ class Meter:
         return np.repeat(np.array(flatten(self.first), dtype=float)[:, None], lanes, axis=1)
 
     def cuts(self) -> list[int]:
-        """The control steps at which windows end, every mark among them."""
+        """The control steps at which windows end, including every mark."""
         return window_ends(self.steps, self.marks)
 
     def metrics(self, noted: Array, windows: Array, lost: Array) -> Metrics:
-        """Return metrics of lanes from their notes (numbers, lanes), those of windows (windows, quantities, lanes), and the
-        control step at which each diverged (lanes,), -1 for those that did not, whose `diverged_at` is NaN. All other
-        metrics of a motion that diverged are NaN."""
+        """Return the metrics of lanes from their notes (numbers, lanes), those of windows (windows, quantities, lanes), and
+        the control steps at which they diverged (lanes,), -1 for lanes that did not, whose `diverged_at` is NaN. All other
+        metrics of a lane that diverged are NaN."""
         kept = lost < 0.0
         metrics = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
         for name, metric in self.table.items():
@@ -166,8 +167,8 @@ class Meter:
         return metrics
 
     def of_recording(self, run: Recording, limit: float) -> dict[str, Any]:
-        """Return metrics of a recording whose samples are the instants. Those without a value are None; `cut_off` names the
-        times that are too late to count, `diverged_at` is the time at which the motion diverged."""
+        """Return the metrics of a recording whose samples are the instants, None for no value; `cut_off` names the times
+        that are too late to count, `diverged_at` is the time at which the motion diverged."""
         lost, ends = run.attrs.get("diverged_at"), [*self.marks, self.steps + 1]
         noted, windows = self._replayed(run, limit, ends)
         metrics: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
@@ -185,14 +186,14 @@ class Meter:
         return metrics
 
     def program(self, columns: Columns, limit: float) -> Program:
-        """Record the notes from the last of `marks` on, for samples with these columns; see `over_samples`."""
+        """Return the program of the notes from the last mark on, for samples with these columns; see `over_samples`."""
         return over_samples(self.notes[1], self.first, (self.numbers, limit), columns)
 
     def _late(self, metric: Metric, instants: Array) -> NDArray[np.bool_]:
         return instants > (1.0 - metric.kept) * self.steps
 
     def _values(self, metric: Metric, noted: Array, windows: Array, ends: Sequence[int]) -> Array:
-        """Apply the metric's kind to the notes; returns (lanes,). `ends` are those of the windows."""
+        """Return a metric (lanes,) from the notes. `ends` are the ends of the windows."""
         if metric.since is None:
             given = [noted[row] for row in metric.rows]
         else:
@@ -212,7 +213,7 @@ class Meter:
 
     def _replayed(self, run: Recording, limit: float, ends: Sequence[int]) -> tuple[Array, Array]:
         """Return the notes of a recording, (numbers, 1), and of its windows, (windows, quantities, 1)."""
-        # Only numbers of each sample, because users may add anything to a Dataset.
+        # Only quantities with numbers for each sample, because users may add anything to a Dataset.
         numbers = {name: values for name, values in run.arrays.items() if values.dtype.kind in "fiu" and name != "time"}
         sampled = {name: x for name, x in numbers.items() if x.ndim in (1, 2) and len(x) == len(run["time"])}
         columns = tuple((name, values.shape[1:]) for name, values in sampled.items())
@@ -246,7 +247,7 @@ def _replay(note: Note, first: Any, numbers: tuple[Any, float], columns: Columns
 
 @cache
 def _observing(note: Note, parts: Composition) -> Callable[..., Any]:
-    """The `note` of an `Observer`; one function for loops that one kernel flies."""
+    """Return the `note` of an `Observer`, the same function for all loops that one kernel serves."""
     read = sampled(parts)
 
     def observe(seen: Any, decided: Any, carry: Any, step: Any, setup: Any, numbers: Any) -> Any:
@@ -256,8 +257,8 @@ def _observing(note: Note, parts: Composition) -> Callable[..., Any]:
 
 
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
-    """Return the function that reads the recorded quantities of a control instant, of the body and of effectors, by name,
-    what the law is told, and whether the estimate is valid: read(decided, step, setup)."""
+    """Return the function read(decided, step, setup) of the quantities of a control instant by name: the recorded ones of
+    body and effectors, the inputs of the law, and whether the estimate is valid."""
 
     def read(decided: Any, step: Any, setup: Any) -> dict[str, Any]:
         read = {name: value for part in _recorded(parts, decided, step, setup) for name, value in part._asdict().items()}
@@ -276,25 +277,25 @@ def _told(parts: Composition, memories: Any) -> dict[str, Any]:
 
 
 def says_valid(parts: Composition) -> bool:
-    """Whether an estimator says if it is valid."""
+    """Return whether an estimator states its validity."""
     return parts.estimator is not None and IS_VALID in parts.estimator.module.Estimate._fields
 
 
 def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:
-    """The recorded quantities of the body and of effectors by name."""
+    """Return the recorded quantities of the body and of effectors by name."""
     there = _recorded(loop.composition(), loop.carry(), 0, loop.setup())
     return {name: quantity for part in there for name, quantity in quantities(type(part)).items()}
 
 
 def _recorded(parts: Composition, decided: Any, step: Any, setup: Any) -> Iterator[Any]:
-    """Return the recorded quantities of effectors, from the last to the first, and of the body, whose names win."""
+    """Return the recorded quantities of effectors, the last first, and of the body, whose names take precedence."""
     body, records, _, _ = make_step(parts).sample(decided, step, setup)
     return reversed((body, *records))
 
 
 def window_ends(steps: int, marks: Sequence[int]) -> list[int]:
-    """The control steps at which windows of a flight end, every mark among them. The last window includes the last instant;
-    if that is a mark, it has a window of its own."""
+    """Return the control steps at which windows of a flight end, including every mark. The last window includes the last
+    instant; if that is a mark, it has a window of its own."""
     edges = [0, *marks, steps]
     ends: set[int] = set()
     for first, last in itertools.pairwise(edges):
@@ -304,21 +305,21 @@ def window_ends(steps: int, marks: Sequence[int]) -> list[int]:
 
 
 def tail_start(steps: int) -> int:
-    """The first instant of the last quarter of a run."""
+    """Return the first instant of the last quarter of a run."""
     return int((steps + 1) * (1.0 - LAST))
 
 
 def middle(steps: int) -> int:
-    """The first instant of the second half of a run."""
+    """Return the first instant of the second half of a run."""
     return (steps + 1) // 2
 
 
 def outside(then: Any, square: Any, bound: Any, now: Any) -> Any:
-    """The last instant at which a square was beyond its bound; NaN is beyond it."""
+    """Return the last instant at which a square exceeded its bound; NaN exceeds it."""
     return where(less_equal(square, bound), then, now)
 
 
 def is_on_limit(command: Any, limit: Any, kind: str) -> Any:
-    """Return whether a command is on its limit, as `on_limit` for samples; never where there is none."""
+    """Return whether a command is on its limit, as `on_limit` for samples; never without a limit."""
     size = sqrt(dot(command, command)) if kind == "norm" else most(command)
     return less(size, -1.0) if kind == "none" else less_equal(limit * ALMOST, size)

@@ -1,4 +1,4 @@
-"""Notes on the modes of a flight: when they first begin, whether losses that are noticed were there, and the largest errors
+"""Notes on the modes of a flight: their first begins, false alarms and missed detections of losses, and the largest errors
 in a mode or a window."""
 
 from __future__ import annotations
@@ -11,37 +11,37 @@ from starhold.algebra.scalar import absolute, both, either, less, maximum, oppos
 from starhold.analysis.meter import INSTANT, Metric
 
 ALARMS = ("false_alarms", "missed_detections")
-"""Losses that were noticed before any fault happened, and whether no loss was noticed from the first fault on."""
+"""The number of losses noticed before any fault, and whether no loss was noticed from the first fault on."""
 
 
 PEAKS = {"peak_attitude_error": "angle", "peak_rate_error": "root"}
-"""Largest errors of a whole flight, or of the part that a requirement covers, with the kinds of metrics."""
+"""Largest errors of a flight, or of the part covered by a requirement, with the kinds of metrics."""
 
 
 class Span(NamedTuple):
-    """A part of a flight: a mode, counted from 1 (none for all of it), and the times between which it lies, in seconds since
-    the mode began, or in instants of the flight."""
+    """A part of a flight: a mode, counted from 1 (None for the whole flight), and its begin and end, in seconds since the
+    mode began, or in instants of the flight."""
 
     mode: tuple[float, ...]
     begin: float
     end: float
 
     def covers(self, quantities: Mapping[str, Any], now: Any) -> Any:
-        """Whether an instant lies in it."""
+        """Return whether an instant lies in it."""
         since = quantities["time_in_mode"] if self.mode else now
         inside = both(less(self.begin, since), less(since, self.end))
         return both(_is(quantities["mode"], self.mode[0]), inside) if self.mode else inside
 
 
 def span(mode: int | None, begin: float, end: float, period: float) -> Span:
-    """The part of a flight between two times (s) that has the control instants from one to the other."""
+    """Return the part of a flight with the control instants between two times (s)."""
     first, last = math.ceil(begin / period - 1e-9) - 0.5, end / period + 0.5
     return Span((), first, last) if mode is None else Span((float(mode),), first * period, last * period)
 
 
 class Wanted(NamedTuple):
-    """The modes whose begin is wanted for, counted from 1; the instant of the first fault: infinite without any, none where
-    losses are not noticed; and the parts of a flight in which angles, and rates, are wanted for."""
+    """The modes whose first begin is noted, counted from 1; the instant of the first fault (infinite without faults, None
+    if losses are not noticed); and the parts of a flight in which angles, and rates, are noted."""
 
     begins: tuple[float, ...] = ()
     fault: tuple[float, ...] = ()
@@ -50,8 +50,8 @@ class Wanted(NamedTuple):
 
 
 class Modal(NamedTuple):
-    """Notes on modes: the last instants before each first begins, the counts of `ALARMS`, and the largest squares of half
-    the angle's sine and of the rate error in parts of the flight (-1: none of them was flown)."""
+    """Notes on modes: the last instants before each first begins, the counts of `ALARMS`, and the largest squares of the
+    sine of half the angle and of the rate error in parts of the flight (-1: the part was not flown)."""
 
     begins: tuple[float, ...]
     alarms: tuple[float, ...]
@@ -60,13 +60,13 @@ class Modal(NamedTuple):
 
 
 def begun(wanted: Wanted) -> Any:
-    """The notes before a flight; none where nothing is wanted."""
+    """Return the notes before a flight; none if nothing is wanted."""
     none: Any = tuple((-1.0,) * len(each) for each in (wanted.begins, wanted.angles, wanted.rates))
     return Modal(none[0], (0.0, 0.0) * len(wanted.fault), *none[1:]) if any(wanted) else ()
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], now: Any, wanted: Wanted, angle: Any, rate: Any) -> Any:
-    """The notes of an instant, of the squares of half the angle's sine and of the rate error."""
+    """Return the notes after an instant, given the squares of the sine of half the angle and of the rate error."""
     if not seen:
         return seen
     begins = tuple(
@@ -88,8 +88,8 @@ def noted(seen: Any, quantities: Mapping[str, Any], now: Any, wanted: Wanted, an
 def table(
     names: tuple[str, ...], spans: Mapping[str, tuple[str, Span]], rows: Any, wanted: Wanted, period: float
 ) -> dict[str, Metric]:
-    """The metrics of notes that lie at these rows; names: of the begins; spans: parts of a flight by the names of their
-    metrics, with the error that is wanted. Nothing is missed where there is no fault."""
+    """Return the metrics of notes at these rows; names: of the begins; spans: parts of a flight by the names of their
+    metrics, with the error to measure. Without a fault no detection is missed."""
     if not rows:
         return {}
     begins = {name: Metric("s", INSTANT, (row,), (period,), kept=0.0) for name, row in zip(names, rows.begins, strict=True)}

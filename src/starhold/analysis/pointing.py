@@ -20,19 +20,19 @@ PERFORMANCE = {
     "PDE": "drift error: between the means over two windows",
 }
 KNOWLEDGE = {"AKE": "APE", "MKE": "MPE", "RKE": "RPE", "KDE": "PDE"}
-"""The indices of knowledge, each with the index of performance that is computed in the same way."""
+"""Knowledge error indices, each with the performance error index that is computed in the same way."""
 MEANINGS = PERFORMANCE | {
     name: PERFORMANCE[like].replace(" error", " error of the estimate") for name, like in KNOWLEDGE.items()
 }
 ANGLE, LINE = "angle", "line of sight"
 OVERLAP, MOST = 4, 2**22
-"""Windows of relative errors begin at each instant or, where that gives more than MOST errors, as often as possible and at
-least OVERLAP times in a window."""
+"""Windows of relative errors begin at each instant or, if that gives more than MOST errors, as often as possible, but at
+least OVERLAP times per window."""
 
 
 class Figures(NamedTuple):
-    """The numbers of an index about an axis: the level below which the share `confidence` stays (rad), the mean of the
-    index, with its sign where it has one, and its standard deviation (rad). None where unknown for combined errors."""
+    """The figures of an index about an axis: the level that the share `confidence` of the errors does not exceed (rad), the
+    mean of the index, signed if it has a sign, and its standard deviation (rad). None if unknown for combined errors."""
 
     level: float
     mean: float | None
@@ -40,8 +40,8 @@ class Figures(NamedTuple):
 
 
 def indices(errors: Array, length: int, apart: int) -> dict[str, Array]:
-    """Return the vectors of each index of PERFORMANCE, (runs, number, 3). errors: (runs, instants, 3); length: instants of a
-    window; apart: instants from the start of a window to that of the other, for drift. ValueError where they do not fit."""
+    """Return the vectors of each index of PERFORMANCE, (runs, number, 3). errors: (runs, instants, 3); length: instants of
+    a window; apart: instants between the starts of the two windows of drift. Raise ValueError if they do not fit."""
     instants = errors.shape[1]
     if min(length, apart) < 1 or length + apart > instants:
         raise ValueError(f"windows of {length} instants, {apart} apart, among {instants}")
@@ -66,16 +66,16 @@ def spacing(runs: int, instants: int, length: int) -> int:
 
 
 def shortfall(apart: int, length: int) -> float:
-    """Bound the share by which the largest relative error is too small where windows begin `apart` instants apart. A window
-    and the next one taken with the same instant differ by k < apart instants at either end. With M the largest relative
-    error of all windows their means differ by at most 2 k M / (length - k).
+    """Return a bound on the share by which the largest relative error is underestimated if windows begin `apart` instants
+    apart. Any window and the nearest one used that contains the same instant differ by k < apart instants at either end.
+    With M the largest relative error of all windows, their means differ by at most 2 k M / (length - k).
     """
     return min(1.0, 2.0 * (apart - 1) / (length - apart + 1))
 
 
 def about_axes(vectors: Array, boresight: Any = None) -> dict[str, Array]:
-    """Return errors (runs, number) about each body axis, signed, and the size of the rotation; with a boresight (any length,
-    body axes) also its tilt: half the angle of the cone that it sweeps."""
+    """Return the signed errors (runs, number) about each body axis, and the rotation angle; with a boresight (any length,
+    body axes) also its tilt, the angle between its true and its wanted direction."""
     components = {axis: vectors[..., place] for place, axis in enumerate("xyz")}
     components[ANGLE] = np.linalg.norm(vectors, axis=-1)
     if boresight is not None:
@@ -84,8 +84,8 @@ def about_axes(vectors: Array, boresight: Any = None) -> dict[str, Array]:
 
 
 def level(values: Array, confidence: float, interpretation: Interpretation) -> float:
-    """Return the least bound that the share `confidence` of errors (runs, number) keeps. mixed: of all of them; temporal: of
-    those of each run, the largest over the runs; ensemble: of the runs, each by its largest error."""
+    """Return the least bound that the share `confidence` of errors (runs, number) keeps. mixed: of all errors; temporal: of
+    the errors of each run, the largest over the runs; ensemble: of the runs, each represented by its largest error."""
     sizes = np.abs(values)
     if interpretation == "mixed":
         return float(np.quantile(sizes, confidence, method="inverted_cdf"))
@@ -100,5 +100,5 @@ def figures(values: Array, confidence: float, interpretation: Interpretation) ->
 
 
 def root_sum_square(sources: list[Figures]) -> Figures:
-    """Return the figures of the sum of independent errors: levels and deviations as root sum squares."""
+    """Return the figures of the sum of independent errors: levels and standard deviations as root sum squares."""
     return Figures(math.hypot(*(one.level for one in sources)), None, math.hypot(*(one.deviation for one in sources)))

@@ -1,5 +1,4 @@
-"""Notes on the premises of a claim about a loop as it flies: how wrong what the law is told is, and how much momentum body
-and wheels have."""
+"""Notes on the premises of a claim about a loop as it flies: the estimation errors, and the momentum of body and wheels."""
 
 from __future__ import annotations
 
@@ -21,9 +20,9 @@ MODES = {"mode": ("mode at the end", "1"), "time_in_mode": ("time since the mode
 
 
 class Premises(NamedTuple):
-    """The largest of a window: the square of the sine of half the angle, and that of the rate, by which the attitude and the
-    rate that the law is told are off; the square of the momentum of body and wheels; a wheel's momentum; and how far q0 is
-    below zero. modes: at its last instant, the mode and for how long (s) it has flown, for a law of modes."""
+    """The maxima in a window: the squared sine of half the angle error, and the squared rate error, of the law's inputs;
+    the squared momentum of body and wheels; a wheel's momentum; and how far q0 is below zero. modes: at its last instant,
+    the mode and for how long (s) it has flown, for a law of modes."""
 
     attitude: float
     rate: float
@@ -42,12 +41,12 @@ class Masses(NamedTuple):
 
 
 def begun(masses: Masses | None) -> Any:
-    """The notes before a flight; none where none are wanted."""
+    """Return the notes before a flight; none if none are wanted."""
     return () if masses is None else Premises(0.0, 0.0, 0.0, 0.0, 0.0, masses.modes)
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
-    """The notes of an instant. What no part reports is given to the law exactly."""
+    """Return the notes after an instant. Quantities that no part reports are given to the law exactly."""
     if not seen:
         return seen
     attitude, rate = (quantities[name] for name in ("attitude", "rate"))
@@ -66,7 +65,7 @@ def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
 
 
 def windows(rows: Any) -> dict[str, Window]:
-    """The windows of notes that lie at these rows."""
+    """Return the windows of notes at these rows."""
     if not rows:
         return {}
     return {

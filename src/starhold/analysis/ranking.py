@@ -10,13 +10,13 @@ COSTS = {
 }
 """Metrics of a law's calls, with their units."""
 LATE = " †"
-"""The mark beside the dash of a time for which a run is too short."""
+"""The mark after the dash of a time for which a run is too short."""
 
 
 @dataclass(frozen=True)
 class Measure:
-    """The presentation of a metric: heading, unit, meaning, the factor from SI to that unit, and whether it is shown where
-    it is 0 for all laws; less is better."""
+    """The presentation of a metric: heading, unit, meaning, the factor from SI to that unit, and whether it is shown if it
+    is 0 for all laws; less is better."""
 
     heading: str
     unit: str
@@ -26,7 +26,7 @@ class Measure:
 
 
 class Metrics(dict[str, Any]):
-    """The results of a law by name, a dictionary; `units` has the unit of each number, "1" for none."""
+    """The results of a law, a dictionary by name; `units` has the unit of each number, "1" for none."""
 
     def __init__(self, values: Mapping[str, Any], units: Mapping[str, str]) -> None:
         super().__init__(values)
@@ -35,8 +35,8 @@ class Metrics(dict[str, Any]):
 
 @dataclass(frozen=True)
 class MetricSet:
-    """How to display the results of laws on a body: the metrics shown, where less is always better; those by which laws are
-    ranked in turn; and the unit of time, with its seconds."""
+    """The presentation of the results of laws on a body: the metrics shown, for which less is always better; those by which
+    laws are ranked in turn; and the unit of time, with its length in seconds."""
 
     measures: Mapping[str, Measure]
     order: tuple[str, ...]
@@ -46,7 +46,7 @@ class MetricSet:
     """The units of metrics as computed, including those not shown."""
 
     def measured(self, row: Mapping[str, Any]) -> Metrics:
-        """Return the results of a law with the units of all numbers."""
+        """Return the results of a law with their units."""
         return Metrics(row, {name: self.units[name] for name in row if name in self.units})
 
     def columns(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -55,7 +55,7 @@ class MetricSet:
         return [name for name, zero in shown.items() if any(name in row and (zero or row[name]) for row in results.values())]
 
     def ranked(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        """Return names from best to worst."""
+        """Return the names of the laws from best to worst."""
 
         def key(name: str) -> tuple[float, ...]:
             values = [results[name].get(metric) for metric in self.order]
@@ -65,7 +65,7 @@ class MetricSet:
         return sorted(results, key=key)
 
     def winners(self, results: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
-        """Return for each metric the names with the least value; none where all are equal or none has a value."""
+        """Return for each metric the names of the laws with the least value; none if all are equal or none has a value."""
         won: dict[str, list[str]] = {}
         for metric in self.measures:
             values = {name: row[metric] for name, row in results.items() if row.get(metric) is not None}
@@ -76,7 +76,7 @@ class MetricSet:
         return won
 
     def shown(self, metric: str, value: Any) -> str:
-        """Show a metric's value in the unit of its heading; a dash where there is none."""
+        """Return a metric's value as text in the unit of its heading; a dash for none."""
         if value is None:
             return "—"
         scaled = float(value) * self.measures[metric].scale
@@ -85,15 +85,15 @@ class MetricSet:
         return f"{scaled:.3g}" if abs(scaled) < 1e3 else f"{scaled:.0f}"
 
     def moment(self, time: float, digits: int = 6) -> str:
-        """Show a time (s) with its unit."""
+        """Return a time (s) as text with its unit."""
         return f"{time / self.tick:.{digits}g} {self.clock}"
 
     def cell(self, metric: str, row: Mapping[str, Any]) -> str:
-        """Show the results of a law as `shown` does, with a mark where a time is too late to count."""
+        """Return a result of a law as `shown` does, with a mark if a time is too late to count."""
         return self.shown(metric, row.get(metric)) + (LATE if metric in row.get("cut_off", ()) else "")
 
     def late(self, results: Mapping[str, Mapping[str, Any]]) -> str:
-        """Explain the mark; empty where no law has one."""
+        """Return the explanation of the mark; empty if no law has one."""
         marked = any(set(row.get("cut_off", ())) & set(self.measures) for row in results.values())
         return (
             f"{LATE.strip()} within its bounds only at the very end of the run, which does not count: fly longer."

@@ -22,16 +22,16 @@ from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.simulation.lane import Recording
 
 DECADES = range(1, 7)
-"""The k of the accuracies 10^-k whose iterations are counted."""
+"""Exponents k of the accuracies 10^-k for which control steps are counted."""
 EXTRAS = ("overshoot", "iterations", *PEAKS)
 """Metrics that campaigns and requirements measure on request; the first two cost more in a kernel."""
 OF_CAMPAIGNS = ("peak_rate", "drift", "peak_wheel_momentum", *PEAKS)
-"""Metrics of a recorded run that only requirements use: its page draws them."""
+"""Metrics of a recorded run that only requirements use, and that its page draws."""
 WHEEL = ("wheel_momentum", "wheel_command", "wheel_available")
 
 MEASURES: dict[str, Measure] = {
     "settling_time": Measure(
-        "settling", "s", "time after which attitude and rate stay within their tolerances, at least for the last tenth"
+        "settling", "s", "time after which attitude and rate stay within their tolerances, for at least the last tenth"
     ),
     "iterations_1e-3": Measure("steps to 1e-3", "", "control steps after which |q| stays within 10^-3, likewise"),
     "overshoot": Measure("overshoot", "%", "largest rotation beyond the target, as a share of the initial angle", 100.0),
@@ -72,8 +72,8 @@ class Cone(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """The numbers of the notes: squares of the sine of half the attitude tolerance and of the rate tolerance ((rad/s)^2);
-    the instant at which the last quarter begins, and the last; cones; what is asked about modes; what premises need."""
+    """Arguments of the notes: squares of the sine of half the attitude tolerance and of the rate tolerance ((rad/s)^2); the
+    first instant of the last quarter, and the last; cones; arguments of the notes on modes and on premises."""
 
     angle: float
     rate: float
@@ -86,8 +86,8 @@ class Bounds(NamedTuple):
 
 
 class Turning(NamedTuple):
-    """Notes on overshoot: the first error as a rotation vector, whether the target was crossed, and the largest rotation
-    beyond it as a share of the first."""
+    """Notes on overshoot: the initial error as a rotation vector, whether the target was crossed, and the largest rotation
+    beyond it as a share of the initial one."""
 
     first: Vector
     crossed: float
@@ -96,10 +96,10 @@ class Turning(NamedTuple):
 
 class Noted(NamedTuple):
     """Notes on a lane: the last instants outside the tolerances; peaks of torque (component), of rate (square) and of wheel
-    momentum; sums of the torque's norm, of instants on the limit and, in the last quarter, of changes of torque; there the
-    first and the last error, and the last torque; squares of the least distances of axes from the middles of cones; what
-    extras need; of a window the largest squares of half the angle's sine, of the rate error and of the torque; and notes on
-    modes, on whether the estimate is valid, and on premises of claims."""
+    momentum; sums of the torque's norm, of instants on the limit and, in the last quarter, of changes of torque; the first
+    and the last error there, and the last torque; squared least distances of axes from the centres of cones; notes for
+    extras; per window the largest squares of the sine of half the angle, of the rate error and of the torque; and notes on
+    modes, on the validity of the estimate, and on premises of claims."""
 
     attitude_outside: float
     rate_outside: float
@@ -143,14 +143,14 @@ def make_meter(
     transient: tuple[float, float] | tuple[()] = (),
     masses: premise_notes.Masses | None = None,
 ) -> Meter:
-    """The meter of flights of `steps` control periods (s), or of as many samples at such intervals.
+    """Return the meter of flights of `steps` control periods (s), or of as many samples at such intervals.
 
-    limit: how the command is limited; tolerances: of the attitude (rad) and of the rate (rad/s); extras: those of EXTRAS
-    that are to be noted; cones: by the names of their metrics; every: control steps in a period; still: the target is at
-    rest; wheels: the body has some; estimated: an estimator says whether it is valid; begins: modes whose first begin is
-    noted, counted from 1, by the names of their metrics; fault: the instant of the first fault, as `Wanted` has it; spans:
-    parts of a flight in which one of PEAKS is noted, by the names of their metrics; transient: the angle (rad) and the rate
-    (rad/s) at which one ends, () for none; masses: for windows of what claims presuppose."""
+    limit: how the command is limited; tolerances: of attitude (rad) and rate (rad/s); extras: the EXTRAS to note; cones: by
+    the names of their metrics; every: control steps in a period; still: the target is at rest; wheels: the body has wheels;
+    estimated: an estimator states its validity; begins: modes whose first begin is noted, counted from 1, by the names of
+    their metrics; fault: the instant of the first fault, as in `Wanted`; spans: parts of a flight in which one of PEAKS is
+    noted, by the names of their metrics; transient: the angle (rad) and the rate (rad/s) at which it ends, () for none;
+    masses: for windows of the premises of claims."""
     iterations, turns = "iterations" in extras, "overshoot" in extras
     levels = (-1.0,) * len(DECADES) if iterations else ()
     turning = Turning(ZERO, 0.0, 0.0) if turns else ()
@@ -222,7 +222,7 @@ def _table(rows: Any, period: float, every: int, wheels: bool) -> dict[str, Metr
         "chatter": Metric("N m", "number", (rows.chatter_sum,), over=("tail", 1.0)),
         "final_attitude_error": Metric("rad", "angle", (rows.window_angle,), since="tail", final=True),
         "final_rate_error": Metric("rad/s", "root", (rows.window_rate,), since="tail", final=True),
-        # Twice the difference of q0 times the vector part is that of the sines of the angles.
+        # The difference of 2 q0 times the vector part is that of the sines of the angles.
         "drift": Metric("rad/s", "distance", (*rows.error, *rows.first_error), (2.0,), ("tail", period), final=True),
     }
     return table | ({"peak_wheel_momentum": Metric("N m s", "number", (rows.peak_wheel_momentum,))} if wheels else {})
@@ -241,13 +241,13 @@ def recorded_meter(
     transient: tuple[float, float] | tuple[()] = (),
 ) -> Meter:
     """Return the meter of a recording of `steps` + 1 samples, at intervals of `every` control periods (s); with cones, even
-    an empty mapping, the meter for requirements."""
+    an empty mapping, it is the meter for requirements."""
     tolerances = attitude_tolerance, rate_tolerance
     there: Any = {"every": every, "wheels": wheels, "estimated": estimated, "transient": transient}
     meter = make_meter(steps, period * every, limit, tolerances, EXTRAS, cones or {}, **there)
     table = {name: metric for name, metric in meter.table.items() if cones is not None or name not in OF_CAMPAIGNS}
     table |= transient_notes.table(places(meter.first).transient, period, every)
-    # Notes of the last quarter are not read before it, so one kernel serves all samples.
+    # Notes for the last quarter are not read before it, so one kernel serves all samples.
     return replace(meter, table=table, notes=(meter.notes[1],) * 2)
 
 
@@ -258,10 +258,10 @@ def measure(
     cones: Mapping[str, Cone] | None = None,
     transient: tuple[float, float] | tuple[()] = (),
 ) -> dict[str, Any]:
-    """Return the metrics of a run from `label`. Times that are never reached are None, as are all final values and times of
-    a run that diverged, and times within the last tenth of the run, whose names `cut_off` lists; `diverged_at` (s) is None
-    for a run that did not diverge. cones: those of requirements, whose metrics are added; None: no requirement. transient:
-    the angle (rad) and the rate (rad/s) at which one ends, whose metrics are added."""
+    """Return the metrics of a recording from `label`. Times that are never reached are None, as are all final values and
+    times of a run that diverged, and times within the last tenth of the run, whose names `cut_off` lists; `diverged_at` (s)
+    is None for a run that did not diverge. cones: those of requirements, whose metrics are added; None without
+    requirements. transient: the angle (rad) and the rate (rad/s) at which a transient ends, whose metrics are added."""
     attrs = run.attrs
     given = attrs["control_period"], int(attrs["record_every"]), attrs["limit"]
     more = cones, "wheel_momentum" in run.arrays, validity_notes.column_of(run.arrays, run.attrs) is not None
@@ -271,11 +271,11 @@ def measure(
 
 @cache
 def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool) -> Any:
-    """The equation of the notes, before the last quarter or in it; one function for loops that one kernel flies."""
+    """Return the equation of the notes, before the last quarter or in it; the same for all loops of one kernel."""
 
     def note(seen: Noted, quantities: Mapping[str, Any], now: Any, most_command: Any, bounds: Bounds) -> Noted:
         q, torque, command = (quantities[name] for name in ("attitude_error", "torque", "command"))
-        # For a target at rest the rate error is the rate; this avoids arithmetic on its zeros, as in `observe`.
+        # For a target at rest the rate error is the rate; this avoids arithmetic on the target's zeros, as in `observe`.
         rate = quantities["rate" if still else "rate_error"]
         # A recording may lack the body's own rate, which no metric of a recording needs.
         turning = quantities.get("rate", rate)
@@ -289,7 +289,7 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
             size = where(less(now, bounds.last), size, 0.0)
             chatter = chatter + where(chatters, sqrt(dot(change, change)), 0.0)
         bound, peak_wheel = is_on_limit(command, most_command, limit), seen.peak_wheel_momentum
-        # A motor is on its limit where the command is all that it can give: less as its momentum saturates, nothing once it
+        # A motor is on its limit if the command is its largest available torque: less near its momentum limit, zero once it
         # is lost.
         for momentum, wanted, there in zip(*(quantities.get(name, ()) for name in WHEEL), strict=True):
             peak_wheel, wanted = maximum(peak_wheel, absolute(momentum)), absolute(wanted)
@@ -323,14 +323,14 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
 
 
 def _nearest(least: Any, cone: Cone, attitude: Any) -> Any:
-    """Return the square of the least distance between the ends of the axis and of the direction."""
+    """Return the squared least distance so far between the ends of the axis and of the direction."""
     apart = subtract(to_reference(attitude, cone.axis), cone.direction)
     return minimum(least, dot(apart, apart))
 
 
 def _turned(seen: Any, q: Any, now: Any) -> Turning:
-    """Take notes on overshoot. A body that starts near a half turn may pass it first, so only motion after the first
-    crossing of the target counts."""
+    """Return the notes on overshoot after an instant. A body that starts near a half turn may pass it first, so only motion
+    after the first crossing of the target counts."""
     turn, begins = rotation_vector(q), less(now, 0.5)
     first = chosen(begins, turn, seen.first)
     along = dot(turn, first) / maximum(dot(first, first), 1e-300)
@@ -339,7 +339,7 @@ def _turned(seen: Any, q: Any, now: Any) -> Turning:
 
 
 def _levels(seen: tuple[Any, ...], square: Any, now: Any) -> tuple[Any, ...]:
-    """Return the last instants at which a square was above those of 10^-k."""
+    """Return the last instants at which a square exceeded those of 10^-k."""
     return tuple(outside(then, square, 10.0 ** (-2 * k), now) for then, k in zip(seen, DECADES, strict=True))
 
 
@@ -351,6 +351,6 @@ AGAINST_LIMITS = {
 """Further metrics of a transient, with their units."""
 _ALL = make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True, estimated=True)
 UNITS = {"diverged_at": "s", **_ALL.units, **AGAINST_LIMITS, **COSTS}
-"""The metrics with their units, SI."""
+"""The SI units of the metrics."""
 METRICS = MetricSet(MEASURES, ("settling_time", "final_attitude_error", "effort"), units=UNITS)
-"""The order of ranking: settled before unsettled, then sooner, then more accurate, then with less effort."""
+"""Ranking: settled before unsettled, then by settling time, accuracy and effort."""

@@ -1,4 +1,4 @@
-"""Searches for the root of the modal law that slews fastest within limits, over the initial angle, and fits the result."""
+"""Searches for the root of the modal law with the fastest slew within limits, over the initial angle, and fits it."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -20,16 +20,16 @@ from starhold.laws.modal import fitted
 from starhold.loop.closed_loop import ClosedLoop
 
 PIECE = 3
-"""The least number of angles for each piece of the fit, which has three numbers."""
+"""The least number of angles for each piece of the fit, which has three parameters."""
 TOGETHER = 128
-"""The number of roots flown in a batch, after which hopeless ones are dropped."""
+"""The number of roots flown in a batch, after each of which hopeless ones are dropped."""
 DECAYS = np.geomspace(0.02, 30.0, 80)
-"""The decays (1/rad) of the first search for the best of a piece."""
+"""The exponents (1/rad) tried first in the fit of a piece."""
 
 
 @dataclass(frozen=True)
 class Best:
-    """The best root (1/s), with its transient, the shortest."""
+    """The best root (1/s), with its transient, which is the shortest."""
 
     root: float
     transient: Transient
@@ -41,8 +41,8 @@ class Best:
 
 
 class Found(NamedTuple):
-    """The best roots for one initial angle (rad): within the limits, and within the limits with their tolerances; None where
-    no root that was tried keeps to them and settles."""
+    """The best roots for one initial angle (rad): within the limits, and within the limits plus tolerances; None if no root
+    tried keeps them and settles."""
 
     angle: float
     hard: Best | None
@@ -50,9 +50,9 @@ class Found(NamedTuple):
 
 
 class Unmet(NamedTuple):
-    """The condition that no root meets from an angle: to reach its "end" at all; or, of those that do, to keep the limit of
-    the "rate" or of the "acceleration", where `least` is the least of their peaks (rad/s or rad/s2) and `root` (1/s) has it;
-    or to keep "both"."""
+    """The condition that no root meets from an angle: to reach the "end" at all; or, if some do, to keep the limit of the
+    "rate" or of the "acceleration", where `least` is the least of their peaks (rad/s or rad/s2), that of `root` (1/s); or
+    to keep "both"."""
 
     what: Literal["end", "rate", "acceleration", "both"]
     least: float = math.nan
@@ -60,7 +60,7 @@ class Unmet(NamedTuple):
 
 
 class TwoPieceFit(NamedTuple):
-    """The fit is c exp(d angle) + e (1/s; angle in rad), c, d, e up to the split (rad) and beyond it."""
+    """The fit c exp(d angle) + e (1/s; angle in rad), with c, d, e up to the split (rad) and beyond it."""
 
     below: tuple[float, float, float]
     above: tuple[float, float, float]
@@ -71,18 +71,18 @@ class TwoPieceFit(NamedTuple):
         return fitted(np.asarray(angles, dtype=float), *self)
 
     def errors(self, angles: ArrayLike, roots: ArrayLike) -> NDArray[np.float64]:
-        """Return relative errors (n,) against roots (n,) at angles (n,)."""
+        """Return the relative errors (n,) of the fit against roots (n,) at angles (n,)."""
         return self.at(angles) / np.asarray(roots, dtype=float) - 1.0
 
 
 PUBLISHED = TwoPieceFit(*(modal.Fit._field_defaults[name] for name in TwoPieceFit._fields))
-"""For limits of 30 deg/s and 50 deg/s2, from 20 deg/s along the axis of the turn."""
+"""The published fit for limits of 30 deg/s and 50 deg/s2, from an initial rate of 20 deg/s about the axis of the slew."""
 
 
 @dataclass(frozen=True)
 class SlewProblem:
-    """The slews start from an angle (rad) about the axis (3,) at a rate (3,) (rad/s) and are flown for `steps` control steps
-    of the modal law's loop; the target is at rest; they end within the ends, in rad and rad/s; b in s."""
+    """Slews from an angle (rad) about the axis (3,) at a rate (3,) (rad/s), flown for `steps` control steps of the modal
+    law's loop to a target at rest; they end within the ends, in rad and rad/s; b in s."""
 
     loop: ClosedLoop
     steps: int
@@ -95,11 +95,11 @@ class SlewProblem:
     def watcher(self) -> Watcher:
         """Return the watcher that flies the problem's loop and checks each step."""
         root = (-1.0, -1.0, -1.0)
-        # Its gains only give the form of those of the lanes.
+        # These gains only define the form of those of the lanes.
         return Watcher(replace(self.loop, gains=modal.Gains(root, root, self.b)), self.angle_end, self.rate_end)
 
     def start(self, angle: float) -> list[float]:
-        """Return the numbers of the state that slews of this angle (rad) start from."""
+        """Return the numbers of the initial state of slews of this angle (rad)."""
         half = math.sin(0.5 * angle) / math.hypot(*self.axis)
         x, y, z = self.axis
         turn = (math.cos(0.5 * angle), half * x, half * y, half * z)
@@ -107,12 +107,12 @@ class SlewProblem:
         return flatten(self.loop.start._replace(attitude=multiply(goal, turn), rate=self.rate))
 
     def gains(self, roots: ArrayLike) -> modal.Gains:
-        """Return the law's gains, with one number for each of the roots (n,)."""
+        """Return the law's gains, with arrays (n,) for the roots (n,)."""
         root: Any = np.asarray(roots, dtype=float)
         return modal.Gains((root, root, root), (root, root, root), self.b)
 
     def fly(self, angle: float, roots: ArrayLike) -> Transients:
-        """Fly the slew of this angle (rad) with each of roots (n,), all of them to their end."""
+        """Return the transients of the slew of this angle (rad) with each of the roots (n,), all flown to the end."""
         starts = np.repeat(np.array([self.start(angle)]).T, len(np.asarray(roots)), axis=1)
         return self.watcher().fly(starts, self.gains(roots), self.steps)
 
@@ -126,7 +126,7 @@ def search(
     notice: Callable[[int, int], None] = lambda done, total: None,
     threads: int | None = None,
 ) -> list[Found]:
-    """Return the best of all roots (n,) for each angle, within `limits` and within `eased`, which are no narrower. Every
+    """Return the best of all roots (n,) for each angle, within `limits` and within `eased`, which are no tighter. Every
     root is flown until it leaves the eased limits, takes longer than the best so far, or ends. `notice` is called with the
     number of angles done and their total.
     """
@@ -144,7 +144,7 @@ def search(
 
 
 def _best(problem: SlewProblem, watcher: Watcher, roots: Any, limits: Limits, eased: Limits, angle: float) -> Found:
-    """Return the search at one angle: block by block from the fastest roots on."""
+    """Return the result of the search at one angle, block by block from the fastest roots on."""
     start = np.array(problem.start(angle))[:, None]
     best: dict[Limits, Best] = {}
     for at in range(0, len(roots), TOGETHER):
@@ -161,14 +161,14 @@ def _best(problem: SlewProblem, watcher: Watcher, roots: Any, limits: Limits, ea
 
 
 def _settled(limits: Limits, least: float, period: float, flown: Flown) -> bool:
-    """Return whether no lane of a block can be the best any more: all are beyond the limits, diverged, or too late."""
+    """Return whether no lane of a block can still be the best: all are beyond the limits, diverged, or too late."""
     beyond = ~flown.transients(period).within(limits) | flown.lost
     late = flown.outside & (flown.steps * period > least)
     return bool((beyond | late).all())
 
 
 def unmet(problem: SlewProblem, angle: float, roots: ArrayLike, limits: Limits) -> Unmet:
-    """Return why `search` finds none of these roots (n,) at an angle (rad)."""
+    """Return the reason why `search` finds none of these roots (n,) at an angle (rad)."""
     roots = np.asarray(roots, dtype=float)
     flown = problem.fly(angle, roots)
     ended = ~np.isnan(flown.time)
@@ -183,8 +183,7 @@ def unmet(problem: SlewProblem, angle: float, roots: ArrayLike, limits: Limits) 
 
 
 def fit(angles: ArrayLike, roots: ArrayLike) -> TwoPieceFit | None:
-    """Return the two pieces, and the split half-way between two angles, of the least rms relative error; None for too few
-    angles.
+    """Return the fit of least rms relative error: two pieces, split half-way between two angles; None for too few angles.
 
     angles: (n,), increasing (rad); roots: (n,), below zero (1/s)."""
     x, y = np.asarray(angles, dtype=float), np.asarray(roots, dtype=float)
@@ -202,7 +201,7 @@ def _piece(x: Any, y: Any) -> tuple[tuple[float, float, float], float]:
     """Return c, d, e of one piece and the sum of its squared relative errors. For a given d the others are linear."""
 
     def solve(d: float) -> tuple[Any, float]:
-        # Weighed by 1/y, so that relative errors count.
+        # Weighted by 1/y, so that relative errors count.
         basis = np.column_stack([np.exp(d * (x - x[0])), np.ones_like(x)]) / y[:, None]
         factors = np.linalg.lstsq(basis, np.ones_like(y), rcond=None)[0]
         return factors, float(np.sum((basis @ factors - 1.0) ** 2))

@@ -1,4 +1,4 @@
-"""The duration of a slew and its peak rate and acceleration, of one run or of many lanes."""
+"""The duration of a slew and its peak rate and acceleration, for one run or many lanes."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ from starhold.trace.machine import widest
 
 @cache
 def watch(parts: Composition) -> Any:
-    """The `note` of an `Observer` that keeps a `Watched`; its numbers are `Ends`."""
+    """Return the `note` of an `Observer` that keeps a `Watched`; its numbers are `Ends`."""
     target = parts.target
     assert target is not None
 
@@ -43,11 +43,11 @@ def watch(parts: Composition) -> Any:
 Array: TypeAlias = NDArray[np.float64]
 
 LEG = 0.5
-"""Seconds of motion between two checks which lanes are still worth flying."""
+"""Time of motion (s) between checks of which lanes are still worth flying."""
 
 
 class Limits(NamedTuple):
-    """Limits of the body's rate, its norm (rad/s), and of each component of its derivative (rad/s2)."""
+    """Limits on the norm of the body's rate (rad/s), and on each component of its derivative (rad/s2)."""
 
     rate: float
     acceleration: float
@@ -55,16 +55,16 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True)
 class Transient:
-    """The time (s) from which angle and relative rate stay within their ends, interpolated between control steps, or None;
-    the largest norm of the body's rate (rad/s); of each component of its derivative the largest mean over a control step
-    (rad/s2)."""
+    """The time (s) from which on angle and relative rate stay within their ends, interpolated between control steps, or
+    None; the largest norm of the body's rate (rad/s); the largest mean over a control step of each component of its
+    derivative (rad/s2)."""
 
     time: float | None
     peak_rate: float
     peak_acceleration: tuple[float, float, float]
 
     def keeps(self, limits: Limits) -> bool:
-        """Whether the motion stays within limits."""
+        """Return whether the motion stays within limits."""
         return self.peak_rate <= limits.rate and max(self.peak_acceleration) <= limits.acceleration
 
 
@@ -77,7 +77,7 @@ class Transients:
     peak_acceleration: Array
 
     def within(self, limits: Limits) -> NDArray[np.bool_]:
-        """A mask (lanes,) of the lanes that stay within limits."""
+        """Return a mask (lanes,) of the lanes that stay within limits."""
         return (self.peak_rate <= limits.rate) & (self.peak_acceleration.max(axis=0) <= limits.acceleration)
 
     def __getitem__(self, lane: int) -> Transient:
@@ -86,7 +86,7 @@ class Transients:
 
 
 def against_limits(run: Recording, limits: Limits, metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the metrics of a run, peaks in SI units among them, with those against limits: the limits (None for none),
+    """Return the metrics of a run, including peaks in SI units, extended by those for limits: the limits (None for none),
     the peak of each component of the acceleration, and whether the limits are kept."""
     peaks = np.abs(acceleration(run)).max(axis=0, initial=0.0).tolist()
     flown = Transient(None, metrics["peak_rate"], tuple(peaks))
@@ -109,25 +109,25 @@ class Flown(NamedTuple):
 
     @property
     def outside(self) -> NDArray[np.bool_]:
-        """A mask (lanes,) of the lanes outside their ends now."""
+        """A mask (lanes,) of the lanes that are now outside their ends."""
         return (self.seen[0] > 1.0) | (self.seen[1] > 1.0) | self.lost
 
     def transients(self, period: float) -> Transients:
-        """The transients of the lanes so far."""
+        """Return the transients of the lanes so far."""
         time = np.where(self.outside, np.nan, self.seen[2:4].max(axis=0) * period)
         return Transients(time, np.sqrt(self.seen[4]), self.seen[5:8])
 
 
 class Watcher:
-    """Flies a loop on many lanes and notes their transients. The loop is unchanged, but without events."""
+    """Flies a loop without its events on many lanes and notes their transients."""
 
     def __init__(self, loop: ClosedLoop, angle_end: float, rate_end: float) -> None:
         self.loop, self.ends = replace(loop, events=()), Ends.of(angle_end, rate_end, loop.period)
         self._leg = max(1, round(LEG / loop.period))
 
     def fly(self, starts: Array, gains: Any, steps: int, threads: int | None = None) -> Transients:
-        """starts: (numbers of a state, lanes); gains: the law's, with an array (lanes,) in place of every number that
-        differs between lanes; steps: control steps."""
+        """Return the lanes after `steps` control steps. starts: (numbers of a state, lanes); gains: the law's, with an
+        array (lanes,) in place of every number that differs between lanes."""
         batch, phase = self._batch(starts, gains, steps)
         batch.prepare(phase)
         with ThreadPool(threads) as pool:
@@ -135,8 +135,8 @@ class Watcher:
         return self._flown(batch, steps).transients(self.loop.period)
 
     def search(self, starts: Array, gains: Any, steps: int, enough: Callable[[Flown], bool]) -> Transients:
-        """Do the same on this thread, and stop early once `enough` is true. Lanes that are then still outside their end have
-        no time."""
+        """Return the same as `fly`, on this thread, stopping early once `enough` is true. Lanes that are then still outside
+        their ends have no time."""
         batch, phase = self._batch(starts, gains, steps)
         flown = self._flown(batch, 0)
         while flown.steps < steps and not enough(flown):

@@ -1,4 +1,4 @@
-"""Notes on the end of a slew and on its peaks, of samples of a recording or of many lanes step by step."""
+"""Notes on the end of a slew and on its peaks, for samples of a recording or for many lanes step by step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from starhold.analysis.meter import CROSSING, Metric
 
 
 class Ends(NamedTuple):
-    """The ends of a transient: the inverse of sin2(angle / 2), and of rate2 ((rad/s)^-2); and the time between notes (s)."""
+    """The ends of a transient: inverses of sin^2(angle / 2) and of rate^2 ((rad/s)^-2); and the time between notes (s)."""
 
     angle: float
     rate: float
@@ -27,9 +27,9 @@ class Ends(NamedTuple):
 
 class Watched(NamedTuple):
     """The notes of a transient: squares of the sine of half the error angle and of the relative rate, both over their ends,
-    at the last instant; the instant, with its fraction, at which each was last above 1; the largest square of the body's
-    rate (rad2/s2); for each of its components the largest mean rate of change from instant to instant (rad/s2); and the
-    last rate (rad/s)."""
+    at the last instant; the fractional instant at which each was last above 1; the largest square of the body's rate
+    (rad2/s2); for each of its components the largest mean rate of change from instant to instant (rad/s2); and the last
+    rate (rad/s)."""
 
     angle: Any = 0.0
     off_rate: Any = 0.0
@@ -61,7 +61,7 @@ def noted(seen: Any, quantities: Mapping[str, Any], now: Any, ends: Any) -> Any:
 
 
 def table(seen: Any, period: float, every: int) -> dict[str, Metric]:
-    """Return the metrics of notes at these rows, of samples at intervals of `every` control periods (s)."""
+    """Return the metrics of notes at these rows, for samples at intervals of `every` control periods (s)."""
     if not seen:
         return {}
     peaks = Metric("rad/s", "root", (seen.peak_rate,)), Metric("rad/s^2", "most", seen.peak_acceleration)

@@ -1,4 +1,4 @@
-"""Flies random states of a certified set against the claim: a test of the certifier, and no part of any proof."""
+"""Flies from random states of a certified set to test the claim: a test of the certifier, not part of any proof."""
 
 import math
 from collections.abc import Callable, Generator
@@ -25,28 +25,28 @@ from starhold.trace.straight_line import evaluated
 
 FLIGHTS = 10_000
 LEGS = (1, 250, 250, 500)
-"""Control steps of the legs after each of which a flight is checked; the first shows the torque at the start."""
+"""Control steps of the legs after each of which a flight is checked; the first checks the torque at the start."""
 SLACK = 1e-6
-"""The relative increase of V between checks that the held torque and the integration may cause."""
+"""The relative increase of V between checks allowed for held torque and integration errors."""
 TURN = 0.05
 """The largest rotation (rad) of a body, or of its momentum in body axes, in a step."""
 
 NEAR, FAR = 1e-7, 10.0
-"""Rotations (q) and rates (rad/s) near rest, where laws are linear, and beyond any boundary layer."""
+"""Sizes of rotations (q) and rates (rad/s) near rest, where laws are linear, and beyond any boundary layer."""
 
 Array: TypeAlias = NDArray[np.float64]
 Height: TypeAlias = Callable[[Array], Array]
-"""V of states, given as columns."""
+"""A function from states, given as columns, to their V."""
 
 
 class BrokenClaimError(Exception):
-    """A flight contradicts what was proved, which is a fault of starhold."""
+    """A flight contradicts a proved claim, which is a fault of starhold."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial: the flights flown from {V <= level}; the largest V at a check as a share of that at the previous one, and the
-    largest torque, of a motor where the claim is about wheels, as a share of the limit (None: no limit is claimed)."""
+    """A trial: the number of flights from {V <= level}; the largest V at a check as a share of that at the previous one,
+    and the largest torque, of a motor if the claim is about wheels, as a share of the limit (None: no limit is claimed)."""
 
     flights: int
     level: float
@@ -55,14 +55,14 @@ class Trial:
 
 
 def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHTS, seed: int = 1) -> Trial | None:
-    """Fly from the largest set in which a limit is claimed to be kept, else from the first one with a claimed ultimate
-    bound, or towards a sliding surface. None where none of these is proved, or floats cannot fly the loop. Raises
-    BrokenClaimError."""
+    """Fly from the largest set in which a limit is claimed to be kept, else from the first with a claimed ultimate bound,
+    or towards a sliding surface, and return the trial. None if none of these is proved, or floats cannot fly the loop.
+    Raise BrokenClaimError if a flight contradicts the claim."""
     proved = [(c, c.programs) for c in certificate.claims if c.outcome == "proved"]
-    # What appendages do to V is not among what is flown here.
+    # The effect of appendages on V is not flown here.
     with_sets = [(c, p) for c, p in proved if p.keys() & {"lyapunov", "surface"} and "motion" not in p]
     claim, programs = next((one for one in with_sets if _limited(one[0])), next(iter(with_sets), (None, None)))
-    # What a memory adds may raise V, as a torque from outside may.
+    # The contribution of a memory may increase V, like an external torque.
     if claim is None or programs is None or "memory" in claim.numbers:
         return None
     if "surface" in programs:
@@ -73,9 +73,9 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     random = np.random.default_rng(seed)
     height = _height(free, programs)
     top = _highest(height)
-    # Where every rate is allowed, up to the V of a body that spins with three times the V of a half turn.
+    # If every rate is allowed, the level includes spins with three times the V of a half turn.
     level = min(4.0 * top, math.inf if level is None else level)
-    # A set about the target alone, of a V that is the same at the other quaternion, has q0 > 0.
+    # A set about the target alone, with a V that is equal at both quaternions, has q0 > 0.
     one_sided = claim.kind == "pointing" and not height(_at_rest(-np.eye(4)[:, :1])).any()
     most = math.pi if one_sided else 2.0 * math.pi
     free, states = _paced(free, certificate, draw(flights, height, level, random, most), random)
@@ -97,8 +97,8 @@ def _limited(claim: Claim) -> bool:
 def falling(
     free: ClosedLoop, certificate: Certificate, claim: Claim, states: Array, value: Height, floor: float
 ) -> Generator[tuple[Batch, float]]:
-    """Return the flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one
-    diverges, or its V increases by more than a small part of it and `floor`."""
+    """Return the flights leg by leg, with the largest V as a share of that one leg before. Raise BrokenClaimError if a
+    flight diverges, or its V increases by more than a small share of it plus `floor`."""
     before, rows = value(states), free.body.module.ROWS
     for steps in LEGS:
         batch = simulate_many(free, states, steps)
@@ -115,7 +115,7 @@ def falling(
 
 
 def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
-    """Fly from random states with s.Js/2 <= level, long enough to reach the surface without torque from outside."""
+    """Fly from random states with s.Js/2 <= level long enough to reach the undisturbed surface; return the trial."""
     J, programs = tensor(loop.craft.inertia), claim.programs
     least, greatest = (float(x) for x in np.linalg.eigvalsh(J)[[0, -1]])
     free = replace(_undisturbed(loop, certificate), sign_policy="as_published")
@@ -135,8 +135,8 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
         flights, height, level, np.random.default_rng(seed), 2.0 * math.pi if claim.numbers["everything"] else math.pi
     )
     s, highest, before = s_of(states), 0.0, height(states)
-    # Held torque lets s.Js/2 increase where reach.|s| is at most half a period times reach.J^-1 reach, and by a step from
-    # there.
+    # With held torque s.Js/2 may increase where reach.|s| is at most half a period times reach.J^-1 reach, and one step
+    # beyond that.
     size = float(np.linalg.norm(reach))
     step = free.period * size / least * (1.0 + 0.5 * size / float(reach.min()))
     chatter = math.sqrt(greatest / least) * (math.sqrt(3.0) * layer + step)
@@ -160,7 +160,7 @@ def _switching(loop: ClosedLoop, K: Array) -> tuple[Array, float]:
 
 
 def _momentum_rate(loop: ClosedLoop, K: Array, rate: list[float]) -> Array:
-    """Return J s' on target at a rate."""
+    """Return J s' on target at a rate (rad/s)."""
     w: Any = tuple(rate)
     turning = vector_part(derivative((1.0, *ZERO), w))
     turned = angular_acceleration(w, cast(Any, tuple(_torque(loop, ZERO, w))), loop.craft)
@@ -168,8 +168,8 @@ def _momentum_rate(loop: ClosedLoop, K: Array, rate: list[float]) -> Array:
 
 
 def _sliding_period(longest: float, K: Array, reach: Array, least: float, greatest: float) -> float:
-    """Return a period in which the body rotates little at the rates of flights to a surface, and in which the torque that
-    holds it there changes by a small part of the switching torque."""
+    """Return a period (s) in which the body rotates little at the rates of flights to a surface, and in which the torque
+    that keeps it there changes by a small share of the switching torque."""
     slope, most = float(np.linalg.norm(K, 2)), float(reach.max())
     period = min(longest, TURN / max(slope, 5.0 * math.sqrt(most / least)))
     while True:
@@ -180,8 +180,8 @@ def _sliding_period(longest: float, K: Array, reach: Array, least: float, greate
 
 
 def draw(count: int, height: Height, level: float, random: np.random.Generator, most: float = 2.0 * math.pi) -> Array:
-    """Return states (16, count) of {V <= level} rotated by at most so much, half of them on its surface. V is quadratic in
-    the rate, with quadratic terms that do not depend on the attitude."""
+    """Return states (16, count) of {V <= level} rotated by at most `most` (rad), half of them on its surface. V is
+    quadratic in the rate, with quadratic terms that do not depend on the attitude."""
     P, units = _squares(height)
     axes, directions = random.normal(size=(2, 3, count))
     axes /= np.linalg.norm(axes, axis=0)
@@ -218,32 +218,32 @@ def _highest(height: Height) -> float:
 
 
 def _at_rest(attitude: Array) -> Array:
-    """Return states at rest of quaternions (4, n)."""
+    """Return states at rest with quaternions (4, n)."""
     states = np.zeros((ROWS.torque.stop, attitude.shape[1]))
     states[ROWS.attitude] = attitude
     return states
 
 
 def _spun(states: Array, rate: Array) -> Array:
-    """Return states with another rate (3,), or one each (3, n)."""
+    """Return states with another rate (3,), or one rate for each (3, n)."""
     spun = states.copy()
     spun[ROWS.rate] = rate if rate.ndim > 1 else rate[:, None]
     return spun
 
 
 def _height(loop: ClosedLoop, programs: Any) -> Height:
-    """Return V of states, whatever quaternion sign the law receives."""
+    """Return the function V of states, for either quaternion sign given to the law."""
     return lambda states: value_of(programs, loop, measured_at(loop, _states(loop, states)))
 
 
 def _states(loop: ClosedLoop, states: Array) -> Any:
-    """Return the body's state of which each number is a column (n,)."""
+    """Return the body's state in which each number is a column (n,)."""
     return unflatten(list(states[: ROWS.torque.stop]), loop.start)
 
 
 def stable_period(loop: ClosedLoop) -> float | None:
-    """Return a period (s) near the longest that floats find stable, or the loop's own if it is stable; None for a law that
-    is not linear near rest, and where there is none."""
+    """Return a period (s) near the longest that is stable in floating point, or the loop's own if it is stable; None for a
+    law that is not linear near rest, or without a stable period."""
     slopes = [_slopes(loop, step) for step in (NEAR, 0.5 * NEAR)]
     if not np.allclose(*slopes, rtol=1e-3, atol=1e-9 * float(np.abs(slopes[0]).max())):
         return None
@@ -252,7 +252,7 @@ def stable_period(loop: ClosedLoop) -> float | None:
 
 
 def _slopes(loop: ClosedLoop, step: float) -> Array:
-    """Return the derivative (3, 6) of the torque by rate and turn at rest, from differences of this size."""
+    """Return the derivative (3, 6) of the torque by rate and rotation at rest, from differences of size `step`."""
     steps = [tuple(map(float, step * e)) for e in np.eye(3)]
     pairs = [(ZERO, x) for x in steps] + [(x, ZERO) for x in steps]
     negative = [tuple(tuple(-x for x in part) for part in pair) for pair in pairs]
@@ -261,7 +261,7 @@ def _slopes(loop: ClosedLoop, step: float) -> Array:
 
 
 def _torque(loop: ClosedLoop, turn: Any, rate: Any) -> Array:
-    """Return the law's torque after a small rotation (q) and at a rate, without wheels."""
+    """Return the law's torque (N m) after a small rotation (q) and at a rate, without wheels."""
     bare = replace(loop, parts=(), events=())
     shown = measured_at(bare, bare.start._replace(attitude=(1.0, *turn), rate=rate))
     memory = loop.law.remember(loop.gains, loop.known, loop.period)
@@ -269,15 +269,15 @@ def _torque(loop: ClosedLoop, turn: Any, rate: Any) -> Array:
 
 
 def _beyond_floats(loop: ClosedLoop, certificate: Certificate) -> bool:
-    """Return whether the loop is linear around rest, but floats find no stable control period."""
+    """Return whether the loop is linear near rest, but has no stable control period in floating point."""
     sampled = certificate.claim("sampling")
     unknown = sampled is not None and sampled.numbers["longest"] is None
     return unknown and stable_period(loop) is None
 
 
 def _undisturbed(loop: ClosedLoop, certificate: Certificate, bounded: bool = False) -> ClosedLoop:
-    """Return the loop as the claims assume it, with a torque updated so often that it counts as continuous; bounded: its
-    wheels, if any, keep their limits."""
+    """Return the loop as the claims assume it, with a torque updated so often that it counts as continuous; bounded: wheels
+    keep their limits."""
     sampled = certificate.claim("sampling")
     longest = None if sampled is None else sampled.numbers["longest"]
     if longest is None:
@@ -300,25 +300,25 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate, bounded: bool = Fal
 def _paced(
     loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator
 ) -> tuple[ClosedLoop, Array]:
-    """Return the loop with a period in which no flight rotates far, and the states with the momenta of their rotors."""
+    """Return the loop with a period in which no flight rotates far, and the states with the momenta of the rotors."""
     fastest = float(np.linalg.norm(states[ROWS.rate], axis=0).max())
     if loop.wheels is not None:
         states = np.vstack([states, _rotors(loop, certificate, states, random)])
-        # The body's momentum is in both.
+        # Both include the body's momentum.
         least = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[0])
         fastest += certificate.subject["wheels"]["total_momentum"] / least
     return replace(loop, period=min(loop.period, TURN / max(fastest, 1e-300))), states
 
 
 def _frictionless(wheels: Wheels, bounded: bool) -> Wheels:
-    """The wheels come back balanced and without friction and, unless bounded, without limits; lost ones stay lost."""
+    """Return the wheels balanced and without friction and, unless bounded, without limits; lost ones stay lost."""
     free = without_friction(wheels)
     limits = tuple(math.inf if limit > 0.0 else 0.0 for limit in wheels.torque_limit)
     return free if bounded else free._replace(torque_limit=limits, momentum_limit=(math.inf,) * len(limits), power_limit=())
 
 
 def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator) -> Array:
-    """Return rotor momenta (wheels, count) for a total momentum of any direction up to the one that is certified."""
+    """Return rotor momenta (wheels, count) for total momenta of any direction up to the certified one."""
     wheels = certificate.subject["wheels"]
     axes, shares, begun = (np.array(wheels[name]) for name in ("axes", "least", "momentum"))
     total = random.normal(size=(3, states.shape[1]))
@@ -337,7 +337,7 @@ def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
     torque = states[ROWS.torque]
     if loop.wheels is not None:
         needs = (("motors", np.array(loop.wheels.least) @ torque), ("wheel_momentum", states[ROWS.torque.stop :]))
-        # A lost wheel is claimed to need zero, and does. Where there is no limit, nothing is claimed.
+        # A lost wheel is claimed to need zero, and does. Without a limit, nothing is claimed.
         limits = [np.array([np.inf if x is None else x for x in claim.numbers.get(name, [None])]) for name, _ in needs]
         shares = [
             np.abs(sizes).max(axis=1) / np.maximum(most, 1e-300) for (_, sizes), most in zip(needs, limits, strict=True)
@@ -350,6 +350,6 @@ def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
 def _broken(
     certificate: Certificate, claim: Claim, states: Array, lane: int, what: str, rows: Any = ROWS
 ) -> BrokenClaimError:
-    # A state begins with what its motion is known by.
+    # The first numbers of a state identify its motion.
     shown = ", ".join(f"{x:.9g}" for x in states[: rows[1].stop, lane])
     return BrokenClaimError(f"{certificate.name}, {claim.kind}: the flight at ({shown}) {what}")

@@ -1,4 +1,4 @@
-"""Notes on whether an estimate is valid: for how much of a flight it is not, and for how long at most at a time."""
+"""Notes on the validity of an estimate: the share of a flight without it, and the longest such interval."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from starhold.parts.contract import IS_VALID
 
 
 class Validity(NamedTuple):
-    """Notes on instants without a valid estimate: their number, and of those in a row that begin a period, last and most."""
+    """Notes on instants without a valid estimate: their number, the length of the present run, and the longest run."""
 
     invalid: float
     row: float
@@ -20,20 +20,20 @@ class Validity(NamedTuple):
 
 
 def column_of(names: Iterable[str], attrs: Mapping[str, Any] = MappingProxyType({})) -> str | None:
-    """The recorded quantity that says whether the law's estimate is valid, None without any; attrs: those of the recording,
-    which name the estimators that only watch."""
+    """Return the name of the recorded quantity that states whether the law's estimate is valid, None without one; attrs:
+    those of the recording, which name the estimators that only watch."""
     watching = {f"{name.replace('-', '_')}_{IS_VALID}" for name in attrs.get("watchers", "").split(", ")}
     saying = [name for name in names if (name == IS_VALID or name.endswith(f"_{IS_VALID}")) and name not in watching]
     return saying[-1] if saying else None
 
 
 def begun(wanted: bool) -> Any:
-    """The notes before a flight; none where there is no such estimate."""
+    """Return the notes before a flight; none without such an estimate."""
     return Validity(0.0, 0.0, 0.0) if wanted else ()
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], now: Any, last: Any) -> Any:
-    """The notes of an instant; last: the last instant of the flight."""
+    """Return the notes after an instant; last: the last instant of the flight."""
     if not seen:
         return seen
     invalid = less(quantities[str(column_of(quantities))], 0.5)
@@ -42,6 +42,6 @@ def noted(seen: Any, quantities: Mapping[str, Any], now: Any, last: Any) -> Any:
 
 
 def table(rows: Any, period: float) -> dict[str, Metric]:
-    """The metrics of notes that lie at these rows."""
+    """Return the metrics of notes at these rows."""
     share = Metric("1", "number", (rows.invalid,), over=("samples", 1.0)) if rows else None
     return {"invalid_share": share, "longest_invalid": Metric("s", "number", (rows.longest,), (period,))} if share else {}

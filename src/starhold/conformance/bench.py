@@ -1,4 +1,4 @@
-"""The spacecraft, states and loops that laws are examined on."""
+"""The spacecraft, states and loops with which laws are examined."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -20,13 +20,13 @@ PERIOD = 0.1
 
 
 def random_quaternions(count: int, seed: int = 7) -> list[Quaternion]:
-    """Attitudes uniform on the rotation group."""
+    """Return attitudes uniformly distributed on the rotation group."""
     numbers = np.random.default_rng(seed).normal(size=(count, 4))
     return [unflatten(q / np.linalg.norm(q), NO_TURN) for q in numbers]
 
 
 def random_measurements(count: int, external: bool = True, seed: int = 11) -> Iterator[Measurement]:
-    """Measurements that a law is shown at random states of a body at a target at rest, with or without a modelled torque."""
+    """Return a law's measurements at random states of a body with a target at rest, with or without a modelled torque."""
     random, magnetic = np.random.default_rng(seed), np.random.default_rng(seed + 2)
     for attitude in random_quaternions(count, seed + 1):
         rate: Vector = unflatten(random.normal(scale=0.05, size=3), ZERO)
@@ -38,11 +38,11 @@ def random_measurements(count: int, external: bool = True, seed: int = 11) -> It
 
 
 ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
-"""An orbit with its gravity gradient."""
+"""The environments of an orbit with gravity gradient."""
 
 
 def sample_loop(law: Law, gains: Any) -> ClosedLoop:
-    """A full 3x3 inertia in orbit under the gravity gradient, with hysteresis and a limit for each axis."""
+    """Return a loop with a full 3x3 inertia in orbit with gravity gradient, hysteresis and a limit on each axis."""
     craft = make_craft([[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]], torque_limit=0.05)
     start = State((0.2, 0.4, -0.7, 0.5567764362830022), (0.04, 0.03, 0.02), (7e6, 1e5, 0.0), (0.0, 7.4e3, 1.2e3), ZERO)
     goal: Quaternion = (0.6, 0.0, 0.8, 0.0)
@@ -59,5 +59,5 @@ def sample_loop(law: Law, gains: Any) -> ClosedLoop:
 
 
 def call(law: Law, measurement: Measurement, gains: Any, craft: Craft = CRAFT) -> Vector:
-    """The torque of a law called once, with a fresh memory."""
+    """Return the torque of a law called once, with its initial memory."""
     return law.command(measurement, gains, craft, law.remember(gains, craft, measurement.period))[0]

@@ -1,4 +1,4 @@
-"""The checks that every part but a law must pass, whatever its role."""
+"""The checks that every part except laws must pass, in any role."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -36,12 +36,12 @@ from starhold.studies.body import body_module
 
 
 def examine_part(part: Part) -> Iterator[Verdict]:
-    """Run every check over a part, in order, going on after failures."""
+    """Run every check over a part, in order, and continue after failures; return the verdicts."""
     return run(CHECKS, part)
 
 
 def find_part(given: str) -> Part:
-    """The part that is installed under a name, or is in a file. InputError where there is none."""
+    """Return the part installed under a name, or in a file. Raise InputError if there is none."""
     installed = {part.name: part for role in ("body", *ROLES) for part in parts(role).values()}
 
     def read(path: Path) -> Part:
@@ -52,7 +52,7 @@ def find_part(given: str) -> Part:
 
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:
-    """A loop with a part and the parts that it needs."""
+    """Return a loop with a part and the parts that it needs."""
     return body_module("starhold.conformance.bodies", part.body or "rigid-body").loop_with(part, params)
 
 
@@ -87,13 +87,13 @@ def is_pure(part: Part) -> None:
     """A flight depends on nothing but its loop."""
     _loops_only(part)
     for params in part.examples():
-        # Plain Python runs the file at every step, so that few suffice; recording a kernel runs it once.
+        # Plain Python runs the file at every step, so few steps suffice; recording a kernel runs it once.
         ends = [numbers_of(fly_plainly(loop_with(part, params), STEPS // 4)) for _ in range(2)]
         require(bool(np.array_equal(*ends, equal_nan=True)), "two flights of the same loop differ")
 
 
 def stays_finite(part: Part) -> None:
-    """All that it gives is finite at rest, at a half turn and at a fast spin."""
+    """All its outputs are finite at rest, at a half turn and at a fast spin."""
     _loops_only(part)
     for params in part.examples():
         loop = loop_with(part, params)
@@ -160,14 +160,14 @@ CRAFT_UNITS = ("kg m^2", "1/(kg m^2)", "N m", "m^3/s^2", "1")
 
 
 def keeps_momentum(part: Part) -> None:
-    """Without torque from outside the angular momentum of body and effector stays as it is."""
+    """Without external torque the angular momentum of body and effector is conserved."""
     if part.role != "effector":
         raise NotApplicableError("only effectors share the body's momentum")
     if part.flag("OUTSIDE"):
         raise NotApplicableError("its torque comes from outside")
     for params in part.examples():
         loop = loop_with(part, params).without("environment")
-        # The command of a law is a torque from outside where the effector does not take it.
+        # The command of a law is an external torque if the effector does not take it.
         loop = loop if part.flag("ACTS") else replace(loop, limit="axis", command_limit=0.0)
         loop = replace(loop, start=loop.start._replace(position=ZERO, velocity=ZERO), period=PERIOD / 10.0)
         carries = [loop.carry(), fly(loop, 10 * STEPS)[1]]
@@ -177,7 +177,7 @@ def keeps_momentum(part: Part) -> None:
 
 
 def _momentum(loop: ClosedLoop, carry: Any) -> Vector:
-    """The angular momentum of body and effectors (N m s, body axes)."""
+    """Return the angular momentum of body and effectors (N m s, body axes)."""
     total = apply(loop.craft.inertia, carry.state.rate)
     for fitted, state, prepared in zip(loop.used("effector"), carry.effectors, loop.setup().effectors, strict=True):
         module = fitted.part.module
@@ -188,7 +188,7 @@ def _momentum(loop: ClosedLoop, carry: Any) -> Vector:
 
 
 def measures_what_it_says(part: Part) -> None:
-    """The fields of readings and estimates are shaped as those of the body's state that they are called after."""
+    """The fields of readings and estimates have the shapes of the body's state fields of the same names."""
     if part.role not in ("sensor", "estimator"):
         raise NotApplicableError("only sensors and estimators give the state")
     for params in part.examples():
@@ -203,7 +203,7 @@ def measures_what_it_says(part: Part) -> None:
 
 
 def draws_in_its_range(part: Part) -> None:
-    """Random numbers differ from step to step and from run to run, and come back with the seed."""
+    """Random numbers differ from step to step and from run to run, and the seed reproduces them."""
     if part.hook("measure") is None and part.hook("update") is None:
         raise NotApplicableError("it draws no random numbers")
     loop = loop_with(part, part.examples()[0])
@@ -230,7 +230,7 @@ def keeps_what_it_says(part: Part) -> None:
         return
     for params in part.examples():
         loop = loop_with(part, params)
-        # In a few steps torques from outside bring in little.
+        # In a few steps external torques contribute little momentum.
         envelope = envelope_of(loop, 1.01 * norm(_momentum(loop, loop.carry())), noisy=True)
         errors, torque, command, change = UNBOUNDED, Push(inf), Push(inf), Push(inf)
         if tell_errors and part.role in COMMANDED:
@@ -249,7 +249,7 @@ def keeps_what_it_says(part: Part) -> None:
 
 
 def _changes(part: Part, loop: ClosedLoop, change: Push) -> Iterator[tuple[str, float, float]]:
-    """Yield how fast a part's torque changes on the orbit, of bodies that turn and that do not, and its bounds."""
+    """Yield the rate of change of a part's torque on the orbit, on rotating and non-rotating bodies, and its bounds."""
     module, numbers = part.module, next(f for f in loop.parts if f.part == part).prepared(loop.period)
     random, time = np.random.default_rng(2), 1e-3
     memory = module.remember(numbers) if part.hook("remember") else None
@@ -293,8 +293,8 @@ def _follows_as_it_says(part: Part) -> None:
 
 
 def _moves_as_it_says(part: Part) -> None:
-    """A target's rate and acceleration are within its `motion` at places of the orbit, at instants of a year or of the time
-    for which it tells them."""
+    """Check that a target's rate and acceleration are within its `motion`, at points of the orbit and instants of a year or
+    of the time for which it states them."""
     for params in part.examples():
         loop, random = loop_with(part, params), np.random.default_rng(3)
         motion = motion_of(loop)
@@ -312,7 +312,7 @@ def _moves_as_it_says(part: Part) -> None:
 
 
 def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:
-    """Yield torques and errors of a part at states of a flight and at other attitudes, and their bounds."""
+    """Yield torques and errors of a part at states of a flight and at other attitudes, with their bounds."""
 
     dice = Silent() if part.hook("noise") else Dice((1, 2), 3, 0)
     fitted, module = next(f for f in loop.parts if f.part == part), part.module
@@ -333,7 +333,7 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
         elif part.role == "sensor":
             reading, memory = module.measure(state, memory, numbers, dice, step)
             if hasattr(reading, "attitude"):
-                # The angle, of whichever quaternion.
+                # The angle, for either sign of the quaternion.
                 turn = 2.0 * norm(vector_part(multiply(conjugate(state.attitude), reading.attitude)))
                 yield "error of the attitude", turn, errors.attitude
             if hasattr(reading, "rate"):
@@ -360,7 +360,7 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
 
 
 def _draws(part: Part) -> bool:
-    """Whether its equation draws random numbers."""
+    """Return whether a part's equation draws random numbers."""
     places: list[int] = []
 
     class Watched(Dice):

@@ -1,4 +1,4 @@
-"""The checks for laws of a body are run over a law."""
+"""Runs the checks for laws of a body over a law."""
 
 from collections.abc import Iterator
 
@@ -9,11 +9,11 @@ from starhold.studies.body import body_module
 
 
 def examine(law: Law) -> Iterator[Verdict]:
-    """Run every check for laws of its body over a law, in order, going on after failures."""
+    """Run every check for laws of its body over a law, in order, and continue after failures; return the verdicts."""
     return run(body_module("starhold.conformance.bodies", law.body).CHECKS, law)
 
 
 def find_law(given: str) -> Law:
-    """The law, for any body, that is installed under a name, or is in a file. InputError where there is none."""
+    """Return the law, for any body, installed under a name, or in a file. Raise InputError if there is none."""
     installed = {name: law for body in parts("body") for name, law in catalogue(body).items()}
     return find(given, installed, lambda path: from_file(path, installed), "law")

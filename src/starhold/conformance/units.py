@@ -1,4 +1,4 @@
-"""Physics in other units: everything a law takes is rescaled by its declared unit."""
+"""Rescales all inputs of a law by their declared units, to test physics in other units."""
 
 from functools import cache
 from typing import Any
@@ -11,14 +11,14 @@ from starhold.parts.part import Part
 from starhold.scenario.units import unit_registry
 
 SYSTEMS = ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0))
-"""Units of mass, length and time, in kg, m and s, in which physics must be the same."""
+"""Systems of units of mass, length and time, in kg, m and s, in which physics must be the same."""
 
 
 def rescaled(
     law: Law, measurement: Measurement, gains: Any, craft: Craft, factors: tuple[float, float, float]
 ) -> tuple[Measurement, Any, Craft, float]:
-    """The arguments of a law in a system of units where 1 kg, 1 m and 1 s are `factors` units, and the factor that takes
-    the torque it gives back to N m."""
+    """Return the arguments of a law in a system of units in which 1 kg, 1 m and 1 s are `factors` units, and the factor
+    that converts its torque back to N m."""
 
     return (
         rescale(measurement, _units(Measurement), factors),
@@ -34,7 +34,7 @@ def _units(cls: Any) -> list[str]:
 
 
 def times(value: Any, factor: float) -> Any:
-    """A number, or nested tuples of numbers, times a factor."""
+    """Return a number, or nested tuples of numbers, times a factor."""
     return tuple(times(part, factor) for part in value) if isinstance(value, tuple) else value * factor
 
 
@@ -47,19 +47,19 @@ def _factor(unit: str, factors: tuple[float, float, float]) -> float:
 
 @cache
 def _powers(unit: str) -> tuple[float, float, float]:
-    """Exponents of mass, length and time in a unit."""
+    """Return the exponents of mass, length and time in a unit."""
     dimensions: Any = unit_registry().parse_units("dimensionless" if unit == "1" else unit).dimensionality
     return (dimensions.get("[mass]", 0.0), dimensions.get("[length]", 0.0), dimensions.get("[time]", 0.0))
 
 
 def rescale(values: Any, units: Any, factors: tuple[float, float, float]) -> Any:
-    """Numbers of these units, one for each field, in another system of units; the same kind of tuple."""
+    """Return a tuple whose fields have these units in another system of units, as the same type."""
     parts = [times(value, _factor(unit, factors)) for value, unit in zip(values, units, strict=True)]
     return type(values)(*parts) if hasattr(values, "_fields") else tuple(parts)
 
 
 def rescale_params(part: Part, params: Any, factors: tuple[float, float, float]) -> Any:
-    """The parameters of a part in another system of units."""
+    """Return the parameters of a part in another system of units."""
     if part.table:
         return params
     values = [

@@ -1,4 +1,4 @@
-"""A check's verdict, and the helpers that the checks of parts of all roles share."""
+"""A check's verdict, and helpers shared by the checks of parts of all roles."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -18,15 +18,15 @@ from starhold.simulation.lanes import simulate_many
 
 Found = TypeVar("Found")
 STEPS = 40
-"""Control steps of a flight that checks fly."""
+"""Control steps of a flight in the checks."""
 
 
 class NonconformityError(Exception):
-    """A law breaks the check; the text says how."""
+    """A law fails a check; the message says how."""
 
 
 class NotApplicableError(Exception):
-    """The check says nothing about this law; the text says why."""
+    """A check does not apply to a law; the message says why."""
 
 
 class Verdict(NamedTuple):
@@ -38,7 +38,7 @@ class Verdict(NamedTuple):
 
 
 def run(checks: Iterable[Callable[..., None]], part: Part) -> Iterator[Verdict]:
-    """Run checks over a part or a law, in order, going on after failures."""
+    """Run checks over a part or a law, in order, and continue after failures; return the verdicts."""
     for check in checks:
         name = (check.__doc__ or check.__name__).splitlines()[0].rstrip(".")
         try:
@@ -56,9 +56,9 @@ def run(checks: Iterable[Callable[..., None]], part: Part) -> Iterator[Verdict]:
 
 
 def find(given: str, installed: Mapping[str, Found], read: Callable[[Path], Found], what: str) -> Found:
-    """Give what is installed under a name, or what `read` finds in the file of this name; what: its kind in errors.
+    """Return the part installed under a name, or the result of `read` for a file of this name; what: its kind in errors.
 
-    InputError where there is none."""
+    Raise InputError if there is none."""
     path = Path(given)
     if given in installed and not path.is_file():
         return installed[given]
@@ -90,7 +90,7 @@ def round_trips(law: Law, write: Callable[..., str], parse: Callable[[str, str],
 
 
 def agree(loop: Any, starts: Sequence[Any], lanes: Sequence[int]) -> None:
-    """Check that a single flight, these lanes of a batch, which start alike, and plain Python agree bit for bit."""
+    """Check that a single flight, these lanes of a batch with the same start, and plain Python agree bit for bit."""
     end, plain = fly(loop, STEPS)[1], fly_plainly(loop, STEPS)
     one = flatten((end.state, end.effectors))
     for threads in (1, 2):

@@ -1,2 +1,2 @@
 """Exports laws for flight: C99 with evidence of its correctness, and shells around it. A shell is a file in `templates` and
-a line of `shells.SHELLS`."""
+an entry of `shells.SHELLS`."""

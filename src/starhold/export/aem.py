@@ -1,4 +1,4 @@
-"""Attitudes over time as CCSDS attitude ephemeris messages (AEM), written and read in their keyword = value form.
+"""CCSDS attitude ephemeris messages (AEM), written and read in keyword = value form.
 
 Versions 1.0 (CCSDS 504.0-B-1) and 2.0 (504.0-B-2). The quaternion Q1 Q2 Q3 QC of a message has its scalar last, and rotates
 REF_FRAME_A into REF_FRAME_B with the convention of `starhold.algebra.quaternion`: a vector's components in A become those in
@@ -27,31 +27,31 @@ if TYPE_CHECKING:
 
 Version = Literal["1.0", "2.0"]
 BODY = "SC_BODY"
-"""The prefix of the names of frames fixed to the spacecraft."""
+"""The prefix of the names of spacecraft-fixed frames."""
 OFF_UNIT = 1e-3
-"""The largest deviation of a quaternion's length from 1 that may be rounding."""
+"""The largest deviation of a quaternion's length from 1 that counts as rounding."""
 VALUES = {"QUATERNION": 4, "QUATERNION/DERIVATIVE": 8, "QUATERNION/RATE": 7, "QUATERNION/ANGVEL": 7}
-"""The attitude types that are read, and the numbers in a line; all but the quaternion are skipped."""
+"""The attitude types that are read, and the count of numbers in a line; all except the quaternion are skipped."""
 NAME = re.compile(r"[ -~]*[!-~][ -~]*")
 _Message = TypeVar("_Message")
 _EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?")
 SECOND = 10**9
-"""Nanoseconds, in which instants are counted."""
+"""Nanoseconds in a second; instants are counted in ns."""
 UNDATED = "2000-01-01T12:00:00"
-"""The epoch of a run without one."""
+"""The default epoch of a run."""
 
 
 def from_date(attitudes: Any, epoch: Date, back: bool = False) -> NDArray[np.float64]:
-    """Convert attitudes (n, 4) relative to the mean equator and equinox of date to those of J2000 (EME2000); back: the
-    reverse."""
+    """Return attitudes (n, 4) relative to the mean equator and equinox of date as attitudes relative to those of J2000
+    (EME2000); back: the reverse."""
     turn = precession(days_of(epoch))
     turned: Any = multiply(conjugate(turn) if back else turn, tuple(np.asarray(attitudes, dtype=float).T))
     return np.stack(turned, axis=1)
 
 
 class Aem(NamedTuple):
-    """The attitudes of a message: times (n,) in s since the first of them, whose epoch it is, quaternions (n, 4), scalar
-    first, from the reference frame to the body's, and the names of the object, the frame and the time system."""
+    """The attitudes of a message: the epoch of the first, times (n,) in s since then, quaternions (n, 4), scalar first,
+    from the reference frame to the body frame, and the names of the object, the frame and the time system."""
 
     times: NDArray[np.float64]
     attitudes: NDArray[np.float64]
@@ -75,10 +75,10 @@ def export_aem(
     """Write the attitudes of a run as a CCSDS attitude ephemeris message, and return its path.
 
     run: what `simulate` returns, a run.nc or the folder of one. epoch: UTC at the start of the run, by default that of the
-    scenario's [orbit], else 2000-01-01T12:00:00. frame: "EME2000", into which the attitudes of a run whose inertial axes are
-    those of date (MOD_EARTH) are turned; any other name is what the inertial axes are called. The quaternions turn the frame
-    to the body's axes, scalar last. InputError for a run without attitudes, a word that does not fit, and a file that cannot
-    be written."""
+    scenario's [orbit], else 2000-01-01T12:00:00. frame: "EME2000", to which the attitudes of a run in axes of date
+    (MOD_EARTH) are converted; any other name is taken as the name of the inertial axes. The quaternions rotate the frame
+    into the body axes, scalar last. Raise InputError for a run without attitudes, a word that does not fit, and a file that
+    cannot be written."""
     flown: Any = open_run(run)
     if "attitude" not in flown:
         raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
@@ -94,7 +94,7 @@ def export_aem(
 
 
 def open_run(place: Any) -> Any:
-    """Return a Dataset itself, or read a run.nc, or that of a folder. InputError where there is none."""
+    """Return a Dataset as it is, or the contents of a run.nc, or of that in a folder. Raise InputError if there is none."""
     if hasattr(place, "data_vars"):
         return place
     import xarray as xr
@@ -120,7 +120,7 @@ def write_aem(
     version: Version = "2.0",
 ) -> None:
     """Write attitudes as a message. times: (n,) s since the epoch, increasing; attitudes: (n, 4), scalar first, from the
-    frame to the body's axes. ValueError where a word does not fit, InputError where the file cannot be written."""
+    frame to the body's axes. Raise ValueError if a word does not fit, InputError if the file cannot be written."""
     stamps = stamps_of(times, epoch, (object_name, object_id, frame, time_system))
     if version not in ("1.0", "2.0"):
         raise ValueError(f"version {version}, which is neither 1.0 nor 2.0")
@@ -143,8 +143,8 @@ def write_aem(
 
 
 def stamps_of(times: Any, epoch: str, words: Iterable[str]) -> list[str]:
-    """The epochs of times (s) since one. ValueError for fewer than two different ones, and for words that a message cannot
-    hold."""
+    """Return the epochs at times (s) since `epoch`. Raise ValueError for fewer than two different times, and for words that
+    a message cannot contain."""
     begun = instant_of(epoch)
     for text in words:
         if not NAME.fullmatch(text):
@@ -156,14 +156,14 @@ def stamps_of(times: Any, epoch: str, words: Iterable[str]) -> list[str]:
 
 
 def write_message(path: Path, version: str, metadata: list[str], rows: list[str]) -> None:
-    """Write a message of one segment. InputError where the file cannot be written."""
+    """Write a message of one segment. Raise InputError if the file cannot be written."""
     made = [f"CREATION_DATE = {datetime.now(UTC):%Y-%m-%dT%H:%M:%S}", "ORIGINATOR = STARHOLD"]
     lines = [version, *made, "", "META_START", *metadata, "META_STOP", "", *rows, ""]
     write_text(path, "\n".join(lines))
 
 
 def read_message(file: str | Path, parse: Callable[[Path], _Message], kind: str) -> _Message:
-    """Read a message of a kind by its function. InputError where it cannot be read."""
+    """Return a message of a kind, read by its function. Raise InputError if it cannot be read."""
     expect(file, (str, Path), "message", "the name of a file")
     try:
         return parse(Path(file))
@@ -175,13 +175,13 @@ def read_message(file: str | Path, parse: Callable[[Path], _Message], kind: str)
 
 @shortly
 def read_aem(file: str | Path) -> Aem:
-    """Read a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first, from
-    the reference frame to the body's axes), and what it is about. InputError where it is none."""
+    """Return a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first,
+    from the reference frame to the body axes), and the names in it. Raise InputError if the file is none."""
     return read_message(file, parse_aem, "a CCSDS attitude ephemeris message")
 
 
 def parse_aem(path: Path) -> Aem:
-    """Read the attitudes of a message of one segment. OSError, or ValueError that names the line and its error."""
+    """Return the attitudes of a message of one segment. Raise OSError, or ValueError with the line and its error."""
     lines = Lines(read_text(path))
     version = lines.value("CCSDS_AEM_VERS")
     if version not in ("1.0", "2.0"):
@@ -199,7 +199,7 @@ def parse_aem(path: Path) -> Aem:
     for earlier, later in pairwise(instants):
         if later <= earlier:
             raise ValueError(f"the epoch {stamp_of(later)} after {stamp_of(earlier)}")
-    # In version 1.0 the scalar may come first.
+    # In version 1.0 the scalar part may come first.
     first = metadata.get("QUATERNION_TYPE") == "FIRST"
     attitudes = table if first else np.roll(table, 1, axis=1)
     frame = metadata["REF_FRAME_A"]
@@ -211,7 +211,7 @@ def parse_aem(path: Path) -> Aem:
 
 
 def _numbers(metadata: dict[str, str]) -> int:
-    """Return the number of numbers in a line of data. ValueError for a type that is not read."""
+    """Return the count of numbers in a line of data. Raise ValueError for a type that is not read."""
     for key in ("OBJECT_NAME", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "ATTITUDE_TYPE"):
         if key not in metadata:
             raise ValueError(f"no {key}")
@@ -263,7 +263,7 @@ class Lines:
         return key.strip(), value.strip()
 
     def row(self, line: str, counts: tuple[int, ...]) -> tuple[int, list[float]]:
-        """Return the instant (ns) and the numbers of a line of one of these counts."""
+        """Return the instant (ns) and the numbers of a line, which must have one of these counts."""
         epoch, *cells = line.split()
         try:
             values, instant = [float(cell) for cell in cells], instant_of(epoch)
@@ -283,7 +283,7 @@ class Lines:
 
 
 def instant_of(epoch: str) -> int:
-    """Return the nanoseconds from the year 1 to an epoch, by days of 86400 s. ValueError if it is not an epoch."""
+    """Return the nanoseconds from the year 1 to an epoch, with days of 86400 s. Raise ValueError if it is not an epoch."""
     match = _EPOCH.fullmatch(epoch)
     if match is None:
         raise ValueError(f"{epoch!r} in place of an epoch such as 2026-03-01T12:00:00")

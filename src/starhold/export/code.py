@@ -1,4 +1,4 @@
-"""A law as C99: one header, one source."""
+"""A law as C99: a header and a source."""
 
 import re
 from dataclasses import dataclass
@@ -20,22 +20,22 @@ from starhold.trace.recording import RESERVED
 from starhold.trace.source import LONG, TIE, Expression, names
 
 SHORT = 130
-"""The most characters of a call that is written inline, except in `return`."""
+"""Most characters of a call that is written inline, except in `return`."""
 
 
 _ANY = 1 << 20
 
 
 class _Kinds(dict[str, str]):
-    """The names in C of the kinds of a trace; structs have their own."""
+    """The C names of the kinds of a trace; structs have their own."""
 
     def __missing__(self, kind: str) -> str:
         return kind
 
 
 class Readable(C99):
-    """The printer of the functions of one law. What it prints of `main` is the body of the step, whose values go to the
-    members of `state` and `command`. parts: names of the parts of memories, by their first places."""
+    """Printer of the functions of a law. `main` becomes the body of the step, whose results go to the members of `state`
+    and `command`. parts: names of the parts of memories, by their first indices."""
 
     types = _Kinds({NUMBER: "double", TRUTH: "bool", INDEX: "int32_t", WORD: "uint64_t", UNIFORM: "bool"})
 
@@ -53,14 +53,14 @@ class Readable(C99):
         self._taken = {*names(function), *memories, *self.titles.values(), "state", "input", "command", "parameters"}
         self._folded = {name: Expression(f"*{name}", "unary") for name in function.shape.addresses}
         for s in statements(function.body):
-            # What is read member by member, or has an address, is a variable.
+            # A value that is read member by member, or has an address, is a variable.
             if isinstance(s, Op) and s.operation.name == MEMBER:
                 self._once.discard(s.args[0])
             elif isinstance(s, Call):
                 pairs = zip(s.args, s.function.params, strict=True)
                 self._once -= {value for value, (name, _) in pairs if name in s.function.shape.addresses}
         called = {ref: name for ref, name in function.shape.names.items() if ref in self._read}
-        # What has a name only until that is given to another value is mostly read once, by that.
+        # A value whose name is later given to another one is mostly read once, by that one.
         last = {name: ref for ref, name in called.items()}
         self._names = {ref: name for ref, name in called.items() if last[name] == ref or ref not in self._once}
         made = [s for s in statements(function.body) if isinstance(s, Op) and s.operation.name == MAKE]
@@ -85,7 +85,7 @@ class Readable(C99):
         self.chunks[function.name] = self.lines[first:]
 
     def _main(self, function: Function) -> None:
-        """Write the body of the step; each member of the state is computed before the first is changed."""
+        """Print the body of the step; all members of the state are computed before the first is changed."""
         self.depth += 1
         self._block(function.body)
         lines: list[str] = []
@@ -103,7 +103,7 @@ class Readable(C99):
     # Values.
 
     def _block(self, block: tuple[Any, ...]) -> None:
-        # A struct may be made where its numbers are read, unless there is a write in between.
+        # A struct may be assembled where its numbers are read, unless there is a write in between.
         fresh: set[str] = set()
         for s in block:
             if isinstance(s, Load):
@@ -115,7 +115,7 @@ class Readable(C99):
         super()._block(block)
 
     def _fresh(self, hint: str) -> str:
-        """Return a name that nothing has in this function."""
+        """Return a name that is unused in this function."""
         name, count = hint, 1
         while name in self._taken:
             count += 1
@@ -132,7 +132,7 @@ class Readable(C99):
     def _keep(self, ref: str, kind: str, expression: Expression, moves: bool = True, most: int = LONG) -> None:
         text = expression.text
         if kind == INDEX or re.fullmatch(r"-[\w.>-]*\w", text):
-            # Written where it is read, however often.
+            # Written where it is read, any number of times.
             self._folded[ref] = expression
         elif (moves or ref in self._rows) and ref in self._once and ref not in self._names and len(text) <= most:
             self._folded[ref] = expression
@@ -175,7 +175,7 @@ class Readable(C99):
             self.put(f"{text};")
 
     def _place(self, s: Load | Store) -> str:
-        """Return the text of a place: from where a part of the memory begins, if it lies in one."""
+        """Return the text of a place in memory, relative to the beginning of its part if it lies in one."""
         first, _, rest = self.text(s.index, INDEX).partition(" + ")
         parts = self.parts.get(s.memory, {})
         if first.isdigit() and (start := max((place for place in parts if place <= int(first)), default=None)) is not None:
@@ -186,12 +186,12 @@ class Readable(C99):
 
 
 def _about(s: Op) -> Any:
-    """Return the type that is made, or the name of the member."""
+    """Return the type that an operation makes, or the name of the member that it reads."""
     return s.operation.plain
 
 
 def check_name(name: str) -> str:
-    """Return a valid prefix of functions and files in C. InputError for any other."""
+    """Return a prefix of functions and files in C. Raise InputError if it is not valid."""
     free = name not in RESERVED and name not in C99.taken and not name.startswith("_")
     if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII) or not free or len(name) > 40:
         raise InputError(
@@ -202,7 +202,7 @@ def check_name(name: str) -> str:
 
 @dataclass(frozen=True)
 class Code:
-    """A law in C: its recorded program, and the texts. name: the beginning of its functions' names; given: the types of the
+    """A law in C: its recorded program, and the texts. name: the prefix of its functions' names; given: the types of the
     parameters, the state and the input (None for none), by their names."""
 
     flight: FlightLaw
@@ -212,16 +212,16 @@ class Code:
     given: dict[str, Type | None]
     command: Type
     parts: dict[str, dict[int, str]]
-    """Names of the parts of its arrays, by their first places."""
+    """Names of the parts of its arrays, by their first indices."""
 
     @cached_property
     def work(self) -> bounds.Work:
-        """Return the largest number of operations of a step."""
+        """Return bounds on the number of operations of a step."""
         return bounds.check(self.program, {}, {}).work
 
     @cached_property
     def printed(self) -> Readable:
-        """Return the functions as text; types that the header has are called without the name of the law in the source."""
+        """Return the functions as text; in the source, types of the header have names without that of the law."""
         return Readable(self.program, self.parts)
 
     @property
@@ -231,7 +231,7 @@ class Code:
 
     @property
     def inputs(self) -> tuple[Member, ...]:
-        """Return the inputs that are read."""
+        """Return the inputs that the law reads."""
         kind = self.given["input"]
         return () if kind is None else kind.members
 
@@ -242,7 +242,7 @@ class Code:
 
 
 def make_code(loop: ClosedLoop, name: str) -> Code:
-    """Return the flight code of a loop's law. InputError for what has no form in C."""
+    """Return the flight code of a loop's law. Raise InputError for parts that have no form in C."""
     flight = flight_law(loop)
     check_name(name)
     values = {"parameters": flight.parameters, "state": flight.start, "input": flight.inputs}
@@ -257,7 +257,7 @@ def make_code(loop: ClosedLoop, name: str) -> Code:
 
 
 def _recorded(flight: FlightLaw, recorder: Reads | Recording, values: dict[str, Any]) -> Any:
-    """Record the step; return what it gives."""
+    """Record the step; return its results."""
 
     def in_memory(leaf: Any) -> Any:
         if not isinstance(leaf, Buffer):

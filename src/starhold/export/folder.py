@@ -1,4 +1,4 @@
-"""Writes a law in C into a folder: header, source, self-test, the file that builds them, and a manifest."""
+"""Writes a law in C into a folder: header, source, self-test, build file and manifest."""
 
 import json
 import re
@@ -28,13 +28,13 @@ COMPILERS = {
     "sparc64-linux-gnu-gcc": "SPARC V9",
     "sparc-gaisler-elf-gcc": "SPARC V8, LEON3",
 }
-"""The compilers that estimate costs, by name, and their targets."""
+"""The compilers used to estimate costs, with their targets."""
 FLAGS = ("-std=c99", "-ffp-contract=off", "-O2", "-fno-math-errno")
 
 
 class Cost(NamedTuple):
-    """A compiler and its target; bytes of code and constants, and the most stack of a step, without a library's sqrt where
-    the processor has none."""
+    """A compiler and its target; bytes of code and constants, and the largest stack of a step, without the library's sqrt
+    if the processor has none."""
 
     compiler: str
     target: str
@@ -43,7 +43,7 @@ class Cost(NamedTuple):
 
 
 def measure(code: Code, header: str, source: str) -> list[Cost]:
-    """Return the costs by each installed compiler; empty where there is none."""
+    """Return the costs for each installed compiler; empty if there is none."""
     return [cost for name in COMPILERS if (cost := _measured(name, code, header, source)) is not None]
 
 
@@ -69,11 +69,11 @@ def _run(folder: str, *command: str) -> str | None:
 
 
 def _stack(code: Code, usage: str) -> int:
-    """Return the most stack of a path of calls; what is inlined has its bytes where it is."""
+    """Return the largest stack (bytes) over paths of calls; inlined functions count in their callers."""
     frames: dict[str, int] = {}
     for line in usage.splitlines():
         name, size, *_ = line.split("\t")
-        # Copies that the compiler made are called after the function, with a dot.
+        # Copies made by the compiler are named after the function, with a dot.
         title = re.sub(r"\..*", "", name.rpartition(":")[2])
         frames[title] = max(frames.get(title, 0), int(size))
     printed, deepest = code.printed, dict[str, int]()
@@ -85,12 +85,12 @@ def _stack(code: Code, usage: str) -> int:
 
 
 MANIFEST = "export.json"
-"""The file that lists the others; it is written last."""
+"""The file that lists the others, written last."""
 
 
 @dataclass(frozen=True)
 class Exported:
-    """A law written as C: its code, its proofs, its costs, and the files by name."""
+    """An exported law: its code, its proofs, its costs, and the files by name."""
 
     code: Code
     proof: Proof
@@ -103,7 +103,7 @@ class Exported:
 def make_files(
     code: Code, scenario: str, law: str, proof: Proof = UNPROVED, more: Mapping[str, str | bytes] = MappingProxyType({})
 ) -> Exported:
-    """Return the files of a law in C, `more` among them, and its costs by the installed compilers."""
+    """Return the files of a law in C, including `more`, and its costs for the installed compilers."""
     header, source = texts(code, scenario, law, proof)
     cases = vectors(code)
     files: dict[str, str | bytes] = {
@@ -123,7 +123,7 @@ def _make(folder: Path) -> None:
 
 
 def write(exported: Exported, folder: Path, scenario: str, law: str) -> None:
-    """Write the files into an existing folder, each whole, the manifest last. InputError where one cannot be written."""
+    """Write the files into an existing folder, each atomically, the manifest last. Raise InputError if one fails."""
     for name, text in exported.files.items():
         if Path(name).parent != Path():
             _make(folder / Path(name).parent)

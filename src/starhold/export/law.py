@@ -1,4 +1,4 @@
-"""The part of a closed loop that runs on the flight computer: from readings of sensors to the command, with all memories."""
+"""The part of a closed loop that runs on the flight computer: from sensor readings to the command, with all memories."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -25,11 +25,11 @@ UNITS = {
     "velocity": Quantity("m/s", "inertial axes"),
     "acceleration": Quantity("rad/s^2", "angular acceleration, target axes"),
 }
-"""The meanings of members whose class does not state them."""
+"""Units and meanings of members whose class does not state them."""
 
 
 class Parameters(NamedTuple):
-    """The numbers that do not change in flight."""
+    """Constants of the flight code."""
 
     gains: Any
     craft: Any
@@ -38,8 +38,8 @@ class Parameters(NamedTuple):
 
 @dataclass(frozen=True)
 class FlightLaw:
-    """The step of a law is `equations`, made by `make` of the parts of its loop: step(parameters, state, inputs) ->
-    (command, state). `parameters`, `start` and `inputs` are its numbers: those of the scenario."""
+    """The step of a law, `equations`, made by `make` from the parts of its loop: step(parameters, state, inputs) ->
+    (command, state). `parameters`, `start` and `inputs` are its numbers from the scenario."""
 
     loop: ClosedLoop
     parts: Composition
@@ -48,12 +48,12 @@ class FlightLaw:
     inputs: Any
     given: tuple[dict[str, str], ...]
     """Readings for an estimator or the law, each with the name of its input: the first of each name, then those of further
-    sensors of the same reading."""
+    sensors with the same reading."""
     command: Any
     """The class of the command."""
 
     def equation(self, copies: Copies | None = None) -> Callable[..., Any]:
-        """Return the step; with copies, made of those."""
+        """Return the step, made of `copies` of the equations if given."""
         if copies is None:
             update = make_equations(self.parts).update
         else:
@@ -101,7 +101,7 @@ class FlightLaw:
 
 
 def flight_law(loop: ClosedLoop) -> FlightLaw:
-    """Return the part of a loop that flies on a computer. InputError for a part that has no form in C."""
+    """Return the part of a loop that runs on the flight computer. Raise InputError for a part that has no form in C."""
     loop = loop.as_commanded()
     parts, setup, carry = loop.composition(), loop.setup(), loop.carry()
     modelled = [place for place, part in enumerate(parts.environments) if part.flag("MODELLED")]
@@ -109,7 +109,7 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         part = parts.environments[place]
         if part.hook("update") or buffers((setup.environments[place],)) or carry.memories.environments[place] != NoMemory():
             raise _no_form(part.name, "a modelled torque that is a function of the state")
-    # Those that decide at control instants have drives of their own, which the command goes to.
+    # Effectors that decide at control instants have their own drive electronics, which gets the command.
     acting = [k for k, part in enumerate(parts.effectors) if part.flag("ACTS") and part.hook("switch") is None]
     if len(acting) > 1:
         raise _no_form(", ".join(parts.effectors[place].name for place in acting), "one effector that takes the command")
@@ -122,7 +122,7 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         for sensor, memory, params in zip(loop.used("sensor"), carry.memories.sensors, setup.sensors, strict=True):
             part = sensor.part
             first = part.module.measure(loop.start, memory, params, Silent(), 0)[0]._asdict()
-            # Without an estimator attitude and rate are inputs.
+            # Without an estimator, attitude and rate are inputs.
             taken = [name for name in first if parts.estimator is not None or name in parts.law.reads]
             repeated = not firsts.keys().isdisjoint(taken)
             inputs = {name: f"{sensor.called.replace('-', '_')}_{name}" if repeated else name for name in taken}
@@ -149,7 +149,7 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         target = Part(target.name, Counted(target.module))  # pyright: ignore[reportArgumentType]
     if acting:
         fields["wheels"] = carry.effectors[acting[0]]
-        notes["wheels"] = Quantity("", "as their tachometers tell")
+        notes["wheels"] = Quantity("", "as their tachometers measure")
     composition = parts._replace(
         target=target,
         environments=tuple(parts.environments[place] for place in modelled),
@@ -209,7 +209,7 @@ _READINGS = SimpleNamespace(
 
 @dataclass(frozen=True)
 class Counted:
-    """Replaces the module of a target: its numbers include the count of control steps, which the law keeps, because it flies
+    """Replaces the module of a target: its numbers include the count of control steps, which the law keeps because it flies
     without the clock of a simulation."""
 
     module: Any
@@ -218,16 +218,16 @@ class Counted:
         return getattr(self.module, name)
 
     def goal(self, params: tuple[Any, Any], state: Any, step: Any, before: Any, *mode: Any) -> Goal:
-        """The goal of the module at the step of the count."""
+        """Return the goal of the module at the counted step."""
         return self.module.goal(params[0], state, params[1], before, *mode)
 
     def begun(self, params: tuple[Any, Any], state: Any, attitude: Any, step: Any, *more: Any) -> Any:
-        """The memory of the module at the step of the count."""
+        """Return the memory of the module at the counted step."""
         return self.module.begun(params[0], state, attitude, params[1], *more)
 
 
 class _Clock:
-    """A control step that notes whether it is read."""
+    """A control step that records whether it is read."""
 
     reader, seen = "itself", False
 
@@ -237,14 +237,14 @@ class _Clock:
 
 
 def _tells_time(loop: ClosedLoop) -> bool:
-    """Tell whether the goal of a loop's target depends on the time, as those at the Sun and at stations do."""
+    """Return whether the goal of a loop's target depends on time, as for targets at the Sun and at stations."""
     clock, mode = _Clock(), (0.0,) if loop.target.part.flag("BY_MODE") else ()
     loop.target.part.module.goal(loop.setup().target, loop.start, clock, loop.carry().memories.followed, *mode)
     return clock.seen
 
 
 def _keeps_sign(parts: Composition, body: Any) -> bool:
-    """Return whether the quaternion sign policy remembers."""
+    """Return whether the quaternion sign policy has a memory."""
     policy = getattr(body, "SIGN_POLICIES", {}).get(parts.sign_policy)
     if policy is None:
         return False
@@ -270,5 +270,5 @@ def _no_form(name: str, allowed: str) -> InputError:
 
 
 def numbers(value: Any) -> list[float]:
-    """Return the numbers of a value as C has them: its floats, then those of its buffers."""
+    """Return the numbers of a value in their order in C: its floats, then those of its buffers."""
     return floats(value) + [leaf[k] for leaf in buffers(value) for k in range(leaf.size)]

@@ -1,4 +1,4 @@
-"""Orbits over time as CCSDS orbit ephemeris messages (OEM), written and read in their keyword = value form.
+"""CCSDS orbit ephemeris messages (OEM), written and read in keyword = value form.
 
 Versions 1.0 to 3.0 (CCSDS 502.0-B-1 to -B-3). Positions and velocities of a message are in km and km/s; here they are in SI.
 """
@@ -27,9 +27,9 @@ NEEDED = ("OBJECT_NAME", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
 
 
 class Oem(NamedTuple):
-    """The orbit of a message: times (n,) in s since the first of them, whose epoch it is, positions and velocities (n, 6; m,
-    m/s), the names of the object, the centre, the frame and the time system, and the rows with which its segments begin,
-    each with the instant at which the one before ends."""
+    """The orbit of a message: the epoch of the first state, times (n,) in s since then, positions and velocities (n, 6; m,
+    m/s), the names of the object, the centre, the frame and the time system, and the first rows of its segments, each with
+    the end of the previous segment."""
 
     times: NDArray[np.float64]
     states: NDArray[np.float64]
@@ -55,9 +55,9 @@ def export_oem(
     """Write the orbit of a run as a CCSDS orbit ephemeris message, and return its path.
 
     run: what `simulate` returns, a run.nc or the folder of one. epoch: UTC at the start of the run, by default that of the
-    scenario's [orbit], else 2000-01-01T12:00:00. frame: "EME2000", into which an orbit in axes of date (MOD_EARTH) is
-    turned; any other name is what the inertial axes are called. center: the body that is orbited. Numbers have all their
-    digits. InputError for a run without an orbit, a word that does not fit, and a file that cannot be written."""
+    scenario's [orbit], else 2000-01-01T12:00:00. frame: "EME2000", to which an orbit in axes of date (MOD_EARTH) is
+    converted; any other name is taken as the name of the inertial axes. center: the central body. Numbers have all their
+    digits. Raise InputError for a run without an orbit, a word that does not fit, and a file that cannot be written."""
     flown: Any = open_run(run)
     if "attitude" not in flown or not np.linalg.norm(flown["position"].to_numpy(), axis=1).all():
         raise InputError("export oem", "", "a run without an orbit", "one of a scenario with [orbit]")
@@ -80,15 +80,15 @@ def export_oem(
 
 @shortly
 def read_oem(file: str | Path) -> Oem:
-    """Read a CCSDS orbit ephemeris message: `times` (s, since the first), `states` (positions and velocities, m and m/s),
-    what it is about, and where its segments begin. Accelerations and covariances are skipped. InputError where it is
-    none."""
+    """Return a CCSDS orbit ephemeris message: `times` (s, since the first), `states` (positions and velocities, m and m/s),
+    the names in it, and the beginnings of its segments. Accelerations and covariances are skipped. Raise InputError if the
+    file is none."""
     return read_message(file, parse_oem, "a CCSDS orbit ephemeris message")
 
 
 def parse_oem(path: Path) -> Oem:
-    """Read the orbit of a message. OSError, or ValueError that names the line and its error: all segments are read, and
-    must be about one object in one frame and follow each other without a gap."""
+    """Return the orbit of a message. All segments are read; they must have the same object and frame and follow each other
+    without a gap. Raise OSError, or ValueError with the line and its error."""
     lines = Lines(read_text(path))
     version = lines.value("CCSDS_OEM_VERS")
     if version not in VERSIONS:
@@ -116,8 +116,8 @@ def parse_oem(path: Path) -> Oem:
 
 
 def _segment(lines: Lines) -> tuple[list[int], list[list[float]], bool]:
-    """Read the instants (ns) and states (km, km/s) of a segment, and whether another one follows. ValueError for another
-    line, and for instants that do not grow."""
+    """Return the instants (ns) and states (km, km/s) of a segment, and whether another one follows. Raise ValueError for
+    any other line, and for instants that do not increase."""
     instants, rows, more = list[int](), list[list[float]](), False
     while (line := lines.following()) is not None:
         more = line == "META_START"

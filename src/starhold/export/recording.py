@@ -1,5 +1,4 @@
-"""Records equations with the calls among them kept as functions, with structs of C for their tuples, and with the names that
-the source has for values."""
+"""Records equations with their calls as functions, their tuples as C structs, and the names of values in the source."""
 
 import ast
 import linecache
@@ -28,8 +27,8 @@ _RECORDED_ONCE = structured.function(lambda: None).__code__
 
 
 class Copies:
-    """Modules are copied with every equation replaced by a function that hands the call, of a copy of the equation, to
-    `call(copy, values)`. Nothing of the modules themselves is changed."""
+    """Copies of modules in which every equation is replaced by a function that passes the call, with a copy of the
+    equation, to `call(copy, values)`. The modules themselves are not changed."""
 
     def __init__(self, call: Callable[[Callable[..., Any], tuple[Any, ...]], Any]) -> None:
         self._call = call
@@ -39,7 +38,7 @@ class Copies:
 
     def seen(self, value: Any) -> Any:
         """Return the substitute for a value in a copy: for an equation a function that forwards the call, for a table or a
-        module of equations another one of such functions."""
+        module of equations one of such functions."""
         if isinstance(value, FunctionType):
             return self._caller(value)
         if isinstance(value, dict) and value and all(isinstance(x, FunctionType) for x in value.values()):
@@ -71,24 +70,24 @@ class Copies:
                 copy = self.copy(inner)
                 return copy(*values, **named) if named else self._call(copy, values)
 
-            # `where` decides by itself on truths that are known while recording.
+            # `where` itself handles truths that are known while recording.
             self._callers[equation] = call if _has_equations(inner.__globals__) and inner.__name__ != "where" else equation
         return self._callers[equation]
 
 
 def _has_equations(names: dict[str, Any]) -> bool:
-    """Return whether a module is one of equations: of this package, or a file with a part."""
+    """Return whether a module contains equations: one of this package, or a file with a part."""
     name = str(names.get("__name__", ""))
     return "CARD" in names or (name.startswith("starhold.") and name not in _WRITTEN_OUT)
 
 
 MAKE, MEMBER = "make", "member"
-"""Operations of this trace alone: a struct of its members, and a member of a struct."""
+"""Operations only of this trace: making a struct of its members, and reading a member of a struct."""
 
 
 class Signature(NamedTuple):
-    """`addresses`: parameters that are passed by their address; `names`: what the source calls values; `module`: where the
-    equation stands; `places`: where what the step gives goes to."""
+    """`addresses`: parameters that are passed by address; `names`: the names of values in the source; `module`: the module
+    of the equation; `places`: the destinations of the step's results."""
 
     addresses: frozenset[str]
     names: dict[str, str]
@@ -97,7 +96,7 @@ class Signature(NamedTuple):
 
 
 class Reads(Recorder):
-    """A recorder of equations that finds which fields are read of tuples passed between equations."""
+    """A recorder that finds which fields of tuples passed between equations are read."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -105,14 +104,14 @@ class Reads(Recorder):
         self._marks: dict[str, tuple[Any, ...]] = {}
 
     def given(self, _: str, like: Any) -> Any:
-        """Return handles in the form of a value."""
+        """Return handles in the shape of a value."""
         return self._marked(like)
 
     def read(self, out: Any) -> set[Any]:
-        """Return the fields that are read for the sake of what a program gives: pairs of a class and a name."""
+        """Return the fields on which the results of a program depend: pairs of a class and a name."""
         live = {leaf.ref for leaf in leaves(self._marked(out)) if isinstance(leaf, Handle)}
         block, read, before = tuple(self._open[0]), set[Any](), -1
-        # All structs of a class have the same members.
+        # All structs of a class must have the same members.
         shared = {ref: fields for ref, fields in self._marks.items() if fields and type(fields[-1][0]) is type}
         while before != (before := len(read)):
             live = live_names(block, live)
@@ -126,7 +125,7 @@ class Reads(Recorder):
         return self._marked(equation(*self._marked(values)), equation.__code__)
 
     def _marked(self, value: Any, owner: Any = None, through: tuple[Any, ...] = ()) -> Any:
-        """Return a value whose numbers are new ones, by which it is told that they are read."""
+        """Return a value with new numbers, which show whether its fields are read."""
         if isinstance(value, tuple):
             fields: Any = getattr(value, "_fields", range(len(value)))  # pyright: ignore
             owner = type(value) if hasattr(value, "_fields") else owner
@@ -142,24 +141,24 @@ class Reads(Recorder):
 
 
 class Recording(Recorder):
-    """A recorder of equations that call each other. read: the fields of classes that are read."""
+    """A recorder of equations and their calls. read: the fields of classes that are read."""
 
     def __init__(self, read: set[Any]) -> None:
         super().__init__()
         self.types = Types(read)
         self.copies = Copies(self._called)
         self.parts: dict[str, dict[int, str]] = {}
-        """Names in the source of the parts of memories, by their first places."""
+        """Names in the source of the parts of memories, by their first indices."""
         self._called_so: dict[str, str] = {}
-        """Names in the source of the values of the function that is recorded."""
+        """Names in the source of the values of the function being recorded."""
 
     def given(self, name: str, like: Any) -> Any:
-        """Return handles in the form of a value, which are the leaves of a variable of C."""
+        """Return handles in the shape of a value, which are the leaves of a C variable."""
         return self._shaped(like, self.types.of(like), name)
 
     def step(self, params: dict[str, Any], results: dict[str, Any]) -> Program:
-        """Return the program whose main function, which has been recorded outside of others, takes these values and writes
-        to the members of others."""
+        """Return the program whose main function, recorded at the outermost level, takes these values and writes to the
+        members of others."""
         outs: dict[str, tuple[Value, str]] = {}
         for name, value in results.items():
             for m, part in self.types.members(self.types.of(value), value):
@@ -196,11 +195,11 @@ class Recording(Recorder):
         return self._shaped(out, result, ref)
 
     def _record(self, equation: Any, values: tuple[Any, ...]) -> Any:
-        """Record a function, unless it only hands on arguments or its result has no type of C."""
+        """Record a function, unless it only passes arguments on or its result has no C type."""
         outer, self._called_so, entry = self._called_so, {}, None
         nothing: Any = None, None, ()
         code = equation.__code__
-        # What a function takes beyond its arguments has the name that it has for all of it.
+        # A value that a function takes besides its arguments keeps its name throughout the function.
         words = [code.co_varnames[min(k, code.co_argcount + code.co_kwonlyargcount)] for k in range(len(values))]
         says = [str(equation.__annotations__.get(word, "")) for word in words]
         kinds: list[Any] = list(map(self.types.of, values, says))
@@ -233,7 +232,7 @@ class Recording(Recorder):
         return entry
 
     def _result(self, equation: Any, out: Any) -> Type | None:
-        """Return the type of what a function gives; of several values a struct whose members are called as they are."""
+        """Return the type of a function's result; for several values a struct whose members have their names."""
         says = str(equation.__annotations__.get("return", ""))
         several = list(out) if isinstance(out, tuple) and not hasattr(out, "_fields") else []  # pyright: ignore
         kinds = [self.types.of(part) for part in several]
@@ -253,7 +252,7 @@ class Recording(Recorder):
     # Structs.
 
     def _whole(self, value: Any, kind: Type) -> Value:
-        """Return the variable that is a value: there is one, or it is made of its members."""
+        """Return the variable of a value: the existing one, or one made of its members."""
         if not kind.members:
             value = self.types.within(value)
             return value.ref if isinstance(value, Handle) else float(value)
@@ -262,7 +261,7 @@ class Recording(Recorder):
         return self._once(_made_of(kind, parts), lambda ref: Op(ref, operation, parts), NUMBER).ref
 
     def _shaped(self, like: Any, kind: Type | None, ref: str) -> Any:
-        """Return the form of a value with the numbers of a variable; those that nobody reads have none."""
+        """Return the shape of a value with the numbers of a variable; numbers that are never read are omitted."""
         if kind is None:
             return mapped(like, lambda leaf: HANDLES[kind_of(leaf)](self, _UNREAD[kind_of(leaf)]) if _counts(leaf) else leaf)
         if not isinstance(like, tuple):
@@ -285,7 +284,7 @@ class Recording(Recorder):
         return out
 
     def _note_parts(self, value: Any) -> None:
-        """Note the names of the parts of a memory; the whole of one has a name already."""
+        """Record the names of the parts of a memory; the memory as a whole already has a name."""
         for name in getattr(value, "_fields", ()):
             part = getattr(value, name)
             if isinstance(part, Buffer) and isinstance(part.cells, Cells) and part.size != part.cells.memory.size:
@@ -293,7 +292,7 @@ class Recording(Recorder):
 
 
 class _Here(NamedTuple):
-    """Names in the source for the value of an expression and for what a call is given; empty where there are none."""
+    """Names in the source for the value of an expression and for the arguments of a call; empty if there are none."""
 
     name: str = ""
     given: tuple[str, ...] = ()
@@ -303,7 +302,7 @@ _THROUGH = ("starhold.trace.", "starhold.export.", "starhold.algebra.operations"
 
 
 def _here() -> _Here:
-    """Return the names at the expression of an equation that runs now."""
+    """Return the names at the expression of the equation that runs now."""
     frame: Any = sys._getframe(1)  # pyright: ignore[reportPrivateUsage]
     while frame is not None and COPIED not in frame.f_globals and frame.f_globals["__name__"].startswith(_THROUGH):
         frame = frame.f_back
@@ -315,7 +314,7 @@ def _here() -> _Here:
 
 @cache
 def _names_in(file: str) -> dict[Any, _Here]:
-    """Return the names at each expression of a file, by where that begins and ends."""
+    """Return the names at each expression of a file, by its begin and end."""
     names_at: dict[Any, _Here] = {}
     for node in ast.walk(ast.parse("".join(linecache.getlines(file)))):
         if isinstance(node, ast.Call):
@@ -337,7 +336,7 @@ _OF_ROLES = frozenset(("torque", "control", "acceleration", "goal", "estimate", 
 
 
 def _title(equation: Any) -> str:
-    """Return the name of a function, with its part's name where several parts have a function of that name."""
+    """Return the name of a function, with its part's name if several parts have a function of that name."""
     name, module = free(equation.__name__), equation.__globals__
     return f"{module['__name__'].rpartition('.')[2]}_{name}" if name in _OF_ROLES and "CARD" in module else name
 
@@ -347,7 +346,7 @@ _UNREAD: Any = {NUMBER: nan, TRUTH: False}
 
 
 def _operation(name: str, takes: tuple[str, ...], gives: str, about: Any) -> Operation:
-    """Return an operation that no equation has; what it is about stands in the place of its plain meaning."""
+    """Return an operation that no equation uses; `about` replaces its plain meaning."""
     return Operation(name, takes, gives, about, {"c": "".join(f"{{{k}}}" for k in range(len(takes)))})
 
 
@@ -356,7 +355,7 @@ def _made_of(kind: Type, parts: Sequence[Value]) -> Any:
 
 
 def _counts(leaf: Any) -> bool:
-    """Return whether a leaf is a number or a truth of the program: not one that is known while recording."""
+    """Return whether a leaf is a number or a truth of the program, not one known while recording."""
     return isinstance(leaf, (Handle, float)) and not isinstance(leaf, bool)
 
 

@@ -1,4 +1,4 @@
-"""Shells around the same C, and their build files: templates filled with the names and numbers of a law."""
+"""Shells around the exported C, and their build files: templates filled with the names and numbers of a law."""
 
 import io
 import re
@@ -24,11 +24,11 @@ SOURCES = {
     "position": ("translation", "read.r_BN_N"),
     "velocity": ("translation", "read.v_BN_N"),
 }
-"""Inputs of laws: the Basilisk message that holds them, and their fields."""
+"""Inputs of laws: the Basilisk message that contains each, and its field."""
 
 
 def filled(template: str, code: Code, **more: Any) -> dict[str, str]:
-    """Return the files of a template by their places, each @KEY@ replaced; a line ==> begins a file with its place."""
+    """Return the files of a template by path, with each @KEY@ replaced; a line ==> begins a file and gives its path."""
     inputs, outputs = variables(code)
     period, kept = code.flight.loop.period, len(numbers(code.flight.start))
     values = {
@@ -57,12 +57,12 @@ def variables(code: Code) -> tuple[list[str], list[str]]:
 
 
 def _basilisk(code: Code) -> dict[str, str]:
-    """Return a law as a module of Basilisk. InputError for inputs that no message of Basilisk holds."""
+    """Return a law as a module of Basilisk. Raise InputError for inputs that no message of Basilisk contains."""
     wanted = [member.name for member in code.inputs]
     for name in wanted:
         if name not in SOURCES:
             raise InputError(
-                "export basilisk", "", f"the input {name}", f"inputs that messages tell of: {', '.join(SOURCES)}"
+                "export basilisk", "", f"the input {name}", f"inputs that messages contain: {', '.join(SOURCES)}"
             )
     reads: list[str] = []
     for message in ("attitude", "translation"):
@@ -75,11 +75,11 @@ def _basilisk(code: Code) -> dict[str, str]:
 def _fmu(code: Code) -> dict[str, bytes]:
     """Return a law as an FMU for co-simulation, FMI 3.0: an archive of sources.
 
-    The standard requires every function of its interface in a binary; those that a sampled law does not need return an
+    The standard requires a binary to have every function of its interface; those that a sampled law does not need return an
     error."""
     inputs, outputs = variables(code)
     taken, given = 'causality="input" start="0.0"', 'causality="output" variability="discrete"'
-    # The standard has a variable of the name `time`, that of the simulation.
+    # In the standard `time` is the variable of simulation time.
     called = ["time_since_start" if name == CLOCK else name for name in inputs]
     roles = [*((name, taken) for name in called), *((name, given) for name in outputs)]
     listed = [f'    <Float64 name="{name}" valueReference="{k}" {role}/>' for k, (name, role) in enumerate(roles, 1)]
@@ -99,18 +99,18 @@ def _fmu(code: Code) -> dict[str, bytes]:
     archived = io.BytesIO()
     with zipfile.ZipFile(archived, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in made.items():
-            # Always the same bytes.
+            # A fixed date, so that the bytes are always the same.
             archive.writestr(zipfile.ZipInfo(name, (2000, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
     return {f"{code.name}.fmu": archived.getvalue()}
 
 
 def _process(code: Code) -> dict[str, str]:
-    """Return a law as a process that commands the plant of its scenario, by the messages of `starhold.link`."""
+    """Return a law as a process that commands the plant of its scenario by messages of `starhold.link`."""
     loop, layout = code.flight.loop, Layout(code.flight.loop)
     acting = [f"effectors.{one.called}" for one in loop.used("effector") if one.part.flag("ACTS")]
     places: list[int] = []
     for name, value in code.flight.inputs._asdict().items():
-        # The last sensor of a quantity is used, as in the simulation.
+        # As in the simulation, the last sensor of a quantity is used.
         known = [f"sensors.{one.called}.{name}" for one in reversed(loop.used("sensor"))]
         known += {"target": ["target"], "wheels": acting[:1], CLOCK: [f"measurement.{CLOCK}"]}.get(name, [f"state.{name}"])
         begin = next(one.first for wanted in known for one in layout.fields if f"{one.name}.".startswith(f"{wanted}."))
@@ -121,7 +121,7 @@ def _process(code: Code) -> dict[str, str]:
 
 
 def _refused(match: re.Match[str]) -> str:
-    """Return functions of FMI 3.0 that refuse: of one name, or with each of some words in place of ~."""
+    """Return functions of FMI 3.0 that return an error: one, or one for each of some words in place of ~."""
     words = [param.replace("[]", "").split()[-1].lstrip("*") for param in match[2].split(",")]
     unused = " ".join(f"(void){word};" for word in words)
     text = f"FMI3_Export fmi3Status {match[1]}({match[2]})\n{{\n    {unused}\n    return fmi3Error;\n}}"
@@ -135,11 +135,11 @@ SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
     "fprime": lambda code: filled("fprime", code),
     "process": _process,
 }
-"""Functions that make the files of a shell over the C, by its name."""
+"""Functions that make the files of a shell, by its name."""
 
 
 def shell_files(code: Code, shells: Iterable[str]) -> dict[str, str | bytes]:
-    """Return the files of shells. InputError for an unknown one, and where a law does not fit one."""
+    """Return the files of shells. Raise InputError for an unknown shell, or a law that does not fit."""
     made: dict[str, str | bytes] = {}
     for shell in shells:
         if shell not in SHELLS:

@@ -1,4 +1,4 @@
-"""The texts of a law in C: header, source and the file that builds them."""
+"""The texts of a law in C: header and source."""
 
 import re
 import textwrap
@@ -21,8 +21,8 @@ from starhold.version import __version__
 
 
 class Proof(NamedTuple):
-    """The certificate's file and the digest of that (both empty for none), its outcome, a line for each claim, what they
-    assume, warnings for readers (empty where all is proved), and the command that checks it again."""
+    """The certificate's file and its digest (both empty for none), its outcome, a line for each claim, the assumptions,
+    warnings for readers (empty if all is proved), and the command to check it again."""
 
     file: str
     digest: str
@@ -37,7 +37,7 @@ UNPROVED = Proof("", "", "", (), (), "NO CERTIFICATE. Nothing was proved about t
 
 
 def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
-    """Return the summary of the certificates of one law; digest: that of the file which holds them, as hexadecimal."""
+    """Return the summary of the certificates of one law; digest: the hexadecimal digest of their file."""
     claims: list[str] = []
     wrong: list[str] = []
     assumed: dict[str, None] = {}
@@ -71,20 +71,20 @@ class Text(NamedTuple):
 
 
 def texts(code: Code, scenario: str, law: str, proof: Proof = UNPROVED) -> Text:
-    """Return header and source. scenario, law: their names in the scenario's file."""
+    """Return header and source. scenario, law: the names of the scenario and of its law."""
     types = _spoken_of(code, _interface(code))
     public = {kind.name: f"{code.name}_{kind.name.removeprefix('flight_')}" for kind in types}
     return Text(_header(code, types, public, scenario, law, proof), _source(code, public))
 
 
 def _interface(code: Code) -> str:
-    """Return the names of the types that the step takes and gives."""
+    """Return the names of the types of the step's arguments and results."""
     kinds = code.given["state"], code.given["input"], code.command
     return " ".join(kind.name for kind in kinds if kind is not None)
 
 
 def _spoken_of(code: Code, text: str) -> list[Type]:
-    """Return the types that a text speaks of, those of members first."""
+    """Return the types that occur in a text, those of members first."""
     types: list[Type] = []
     for kind in reversed(code.types.known.values()):
         if re.search(rf"\b{kind.name}\b", text):
@@ -128,7 +128,7 @@ STATE = Type("flight_state_t", "", named=True)
 
 
 def _state(code: Code, public: dict[str, str]) -> Iterator[str]:
-    """Yield the declaration of the state."""
+    """Yield the lines of the state's declaration."""
     if code.flight.start._fields:
         yield from comment("The memory from step to step: set it by the function below, and do not change it.")
         kind = code.given["state"] or STATE
@@ -180,7 +180,7 @@ def _limit(loop: Any) -> str:
 
 
 def _choices(loop: Any) -> list[str]:
-    """Return the gains that are constants of this code."""
+    """Return the comment on the gains that are constants of this code."""
     pairs = zip(fields(type(loop.gains)), loop.gains, strict=True)
     choices = [f"{item.name} = {item.written(value)}" for item, value in pairs if item.gain.choices or item.gain.whole]
     return [f"Fixed in this code: {', '.join(choices)}."] if choices else []
@@ -231,7 +231,7 @@ def _rule(title: str) -> str:
 
 
 def _declaration(kind: Type, public: dict[str, str], arrays: Mapping[str, int] = MappingProxyType({})) -> Iterator[str]:
-    """Yield the lines of a struct; public: names of types that the header has; arrays: names and sizes of more members."""
+    """Yield the lines of a struct; public: names of types in the header; arrays: names and sizes of further members."""
     yield from comment(kind.text)
     yield "typedef struct {"
     members = kind.members
@@ -259,7 +259,7 @@ def _member(member: Member, public: dict[str, str]) -> Iterator[str]:
 
 
 def _constants(code: Code) -> Iterator[str]:
-    """Yield the lines of the numbers that do not change in flight."""
+    """Yield the lines of the constant parameters."""
     if (kind := code.given["parameters"]) is not None:
         yield "static const parameters_t parameters = {"
         yield from _fields(code, kind, code.flight.parameters, "    ")
@@ -278,14 +278,14 @@ def _fields(code: Code, kind: Type, value: Any, indent: str) -> Iterator[str]:
 
 
 def _literal(code: Code, kind: Type, value: Any) -> str:
-    """Return the text of numbers that are known."""
+    """Return the C text of a constant value."""
     if not kind.members:
         return code.printed.text(code.types.within(value), NUMBER)
     return kind.braced([_literal(code, member.type, part) for member, part in code.types.members(kind, value)])
 
 
 def _init(code: Code) -> Iterator[str]:
-    """Yield the lines that set the state to its start."""
+    """Yield the lines that set the initial state."""
     name, printed, start = code.name, code.printed, code.flight.start
     firsts = {memory: _trimmed(one.row(0, one.size)) for memory, one in zip(code.buffers, buffers(start), strict=True)}
     for memory, first in firsts.items():

@@ -1,4 +1,4 @@
-"""Types of C for the values of equations: structs with the fields of NamedTuples, vectors, quaternions, matrices."""
+"""C types for the values of equations: structs with the fields of NamedTuples, vectors, quaternions, matrices."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from starhold.trace.source import TIE
 
 
 class Member(NamedTuple):
-    """A member of a struct has a name (of an array its place in it), a type, and its place in the tuple in Python."""
+    """A member of a struct: its name (in an array, its index), its type, and its index in the Python tuple."""
 
     name: str
     type: Type
@@ -27,8 +27,8 @@ class Member(NamedTuple):
 
 
 class Type(NamedTuple):
-    """A scalar (no members), or a struct; `kind`: what a trace calls it. `elements`: a struct of one array, of that name.
-    `named`: one of a NamedTuple, which is passed by its address."""
+    """A scalar (no members), or a struct; `kind`: its kind in a trace. `elements`: the name of the array in a struct of one
+    array. `named`: the struct of a NamedTuple, which is passed by address."""
 
     name: str
     kind: str
@@ -40,7 +40,7 @@ class Type(NamedTuple):
     def braced(self, parts: list[str]) -> str:
         """Return the C initialiser that gives the members of a variable these values."""
         pairs = zip(self.members, parts, strict=True)
-        # A literal needs its type nowhere but where it stands alone.
+        # A literal needs its type only where it stands alone.
         texts = [text.removeprefix(f"({member.type.name})") for member, text in pairs]
         if self.named:
             texts = [f".{member.name} = {text}" for member, text in zip(self.members, texts, strict=True)]
@@ -48,7 +48,7 @@ class Type(NamedTuple):
         return f"{{{{{inner}}}}}" if self.elements else f"{{{inner}}}"
 
     def leaves(self, base: str = "") -> Iterator[str]:
-        """Yield how the numbers of a variable are reached."""
+        """Yield the C expressions of the numbers of a variable."""
         if not self.members:
             yield base
         for member in self.members:
@@ -69,14 +69,14 @@ _PLAIN = {(DOUBLE, 3): VECTOR, (DOUBLE, 4): QUATERNION, (VECTOR, 3): MATRIX}
 
 
 class Types:
-    """Types by their names, each with one form. read: the fields of classes that somebody reads: structs have no others."""
+    """Types by unique name. read: the fields of classes that are read: structs have no others."""
 
     def __init__(self, read: set[Any]) -> None:
         self.known = {kind.name: kind for kind in (QUATERNION, VECTOR, MATRIX)}
         self.read = read
 
     def of(self, value: Any, annotation: str = "") -> Type | None:
-        """Return the type of a value; None where recording leaves nothing of it."""
+        """Return the type of a value; None if it has no numbers after recording."""
         if value is None or isinstance(value, (bool, int, Buffer)):
             return None
         if not isinstance(value, tuple):
@@ -89,7 +89,7 @@ class Types:
         first, count = kinds[0], len(value)  # pyright: ignore
         if len(kinds) < count or any(kind != first for kind in kinds):
             return self.several("several_t", [(f"part{k}", self.of(part), k) for k, part in enumerate(value)])  # pyright: ignore
-        # Of what is not annotated four numbers are a quaternion.
+        # Without an annotation, four numbers are a quaternion.
         if (first, count) in _PLAIN and (count != 4 or not annotation or re.search("Quaternion|Any", annotation)):
             return _PLAIN[first, count]
         name = f"{first.name.removesuffix('_t')}s{count}_t"
@@ -107,12 +107,12 @@ class Types:
         return self._keep(Type(name, name, tuple(members), "", True, sentence(cls.__doc__ or ""))) if members else None
 
     def several(self, name: str, parts: list[tuple[str, Type | None, int]], text: str = "") -> Type | None:
-        """Return a struct of values that belong together."""
+        """Return a struct of several values."""
         members = tuple(Member(word, kind, place) for word, kind, place in parts if kind is not None)
         return self._keep(Type(name, name, members, "", bool(text), text)) if members else None
 
     def _keep(self, kind: Type) -> Type:
-        """Return a type under a name that no other has."""
+        """Return a type under a unique name."""
         base, count = kind.name.removesuffix("_t"), 1
         while self.known.get(kind.name, kind) != kind:
             count += 1
@@ -120,12 +120,12 @@ class Types:
         return self.known.setdefault(kind.name, kind)
 
     def members(self, kind: Type | None, value: Any) -> Iterator[tuple[Member, Any]]:
-        """Yield the members of a struct and their values among those of a tuple, or of that within tuples of one value."""
+        """Yield the members of a struct and their values from a tuple, which may be nested in tuples of one value."""
         for member in kind.members if kind is not None else ():
             yield member, self.within(value)[member.place]
 
     def within(self, value: Any) -> Any:
-        """Return the value inside tuples of one value."""
+        """Return the value inside nested tuples of one value."""
         while isinstance(value, tuple) and not hasattr(value, "_fields"):
             typed = [part for part in value if self.of(part) is not None]  # pyright: ignore
             if len(typed) != 1:
@@ -135,20 +135,20 @@ class Types:
 
 
 def free(name: str) -> str:
-    """Return a name that is no word of the language."""
+    """Return a name that is no reserved word of the language."""
     name = name.strip("_") or "x"
     return f"{name}_of" if name in RESERVED else name
 
 
 def title(cls: Any) -> str:
-    """A struct is called as its class; parts have classes of the same names, which are called after the part too."""
+    """Return the name of a struct, that of its class; classes of parts with equal names get the part's name too."""
     name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower().strip("_")
     ambiguous = name in ("params", "memory", "numbers", "reading") or (name == "state" and ".bodies." not in cls.__module__)
     return f"{cls.__module__.rpartition('.')[2]}_{name}" if ambiguous else name
 
 
 def _meaning(cls: Any, name: str) -> str:
-    """Return unit and meaning of a field, where its class says them."""
+    """Return unit and meaning of a field, if its class states them."""
     try:
         hint = get_type_hints(cls, include_extras=True).get(name)
     except (NameError, TypeError):
@@ -160,12 +160,12 @@ def _meaning(cls: Any, name: str) -> str:
 
 
 def tied(text: str) -> str:
-    """Return a text that stays on one line where it is short."""
+    """Return a text that stays on one line if it is short."""
     return text.replace(" ", TIE) if len(text) < 65 else text
 
 
 def sentence(doc: str) -> str:
-    """Return the first sentence of a docstring, unless Python made it."""
+    """Return the first sentence of a docstring, unless Python generated it."""
     text = " ".join(doc.split())
     return "" if re.match(r"\w+\(.*\)$", text) else re.split(r"(?<=\.) (?=[A-Z])", text, maxsplit=1)[0]
 
@@ -180,7 +180,7 @@ def wrapped(text: str, width: int = 104) -> list[str]:
 
 
 def comment(text: str) -> list[str]:
-    """Return a text as the lines of a comment; none of nothing."""
+    """Return a text as the lines of a comment; none for an empty text."""
     lines = wrapped(text)
     if len(lines) < 2:
         return [f"/* {line} */" for line in lines]

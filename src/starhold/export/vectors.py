@@ -1,4 +1,4 @@
-"""Test vectors of a law, and the self-test in C that demands their bits."""
+"""Test vectors of a law, and the self-test in C that requires their bits."""
 
 import math
 from typing import Any, NamedTuple
@@ -17,15 +17,15 @@ from starhold.trace.recording import Recorder
 
 EDGES = (0.0, -0.0, 5e-324, -2.2250738585072014e-308, 1e-160, 1.0, -1.0, 1e155, -1.7976931348623157e308, math.inf, -math.inf,
          math.nan)  # fmt: skip
-"""Numbers at which arithmetic is special."""
+"""Numbers at the edges of floating-point arithmetic."""
 RUNS, STEPS = 12, 16
 NAN = 0x7FF8000000000000
 _PRIME, _BASIS = 0x100000001B3, 0xCBF29CE484222325
 
 
 class Vector(NamedTuple):
-    """Before a step: whether the state is reset, and the measured numbers that are read; after it the numbers of the
-    command, and the digest of those of the state."""
+    """A test vector: before a step, whether the state is reset, and the inputs that are read; after it, the numbers of the
+    command, and the digest of the state."""
 
     first: bool
     inputs: list[float]
@@ -34,7 +34,7 @@ class Vector(NamedTuple):
 
 
 def kept_inputs(code: Code) -> list[int]:
-    """Return the places of the inputs' numbers that the law reads."""
+    """Return the indices of the inputs' numbers that the law reads."""
 
     def those(kind: Type | None, value: Any) -> list[int]:
         kept = [place for member, part in code.types.members(kind, value) for place in those(member.type, part)]
@@ -47,8 +47,8 @@ def kept_inputs(code: Code) -> list[int]:
 def random_columns(
     rng: np.random.Generator, value: Any, count: int, edges: float = 0.0, name: str = ""
 ) -> NDArray[np.float64]:
-    """Return (numbers, count) to stand in place of the floats of a value: quaternions of unit length, flags of 0 or 1,
-    others of any size up to twice the largest of their field; a share `edges` of them is special."""
+    """Return random numbers (numbers, count) to replace the floats of a value: quaternions of unit length, flags of 0 or 1,
+    others of any size up to twice the largest of their field; a share `edges` of them comes from EDGES."""
     if hasattr(value, "_fields"):
         pairs = list(zip(value._fields, value, strict=True))
     elif isinstance(value, tuple) and any(isinstance(part, tuple) for part in value):
@@ -74,14 +74,14 @@ def random_columns(
 
 
 def with_numbers(value: Any, column: NDArray[np.float64]) -> Any:
-    """Return a value with these floats in place of its own, in order."""
+    """Return a value with its floats replaced by these, in order."""
     source = iter(column.tolist())
     return mapped(value, lambda leaf: next(source) if isinstance(leaf, float) else leaf)
 
 
 class Stepper:
-    """The step that C must equal, step(state, inputs) -> (command, state): the equations of the simulation, recorded and
-    compiled as there, so that it continues past a division by zero as C does."""
+    """The reference step for C, step(state, inputs) -> (command, state): the equations of the simulation, recorded and
+    compiled as there, so that it continues past a division by zero, as C does."""
 
     def __init__(self, code: Code) -> None:
         flight, recorder = code.flight, Recorder()
@@ -117,7 +117,7 @@ def fresh(state: Any) -> Any:
 
 
 def digest(values: list[float]) -> int:
-    """Return the 64-bit FNV-1a hash of the bits of numbers, any NaN being the same."""
+    """Return the 64-bit FNV-1a hash of the bits of numbers; all NaNs count as equal."""
     value = _BASIS
     for word in bits(values):
         for shift in range(0, 64, 8):
@@ -126,14 +126,14 @@ def digest(values: list[float]) -> int:
 
 
 def bits(values: list[float]) -> list[int]:
-    """Return the bits of numbers, any NaN being the same."""
+    """Return the bits of numbers; all NaNs count as equal."""
     words = np.asarray(values, dtype=float).view(np.uint64).tolist()
     return [NAN if math.isnan(x) else int(word) for x, word in zip(values, words, strict=True)]
 
 
 def vectors(code: Code, seed: int = 1) -> list[Vector]:
-    """Return steps that follow one another from the start in some runs, each with measurements of its own; in every
-    second run some of them are special."""
+    """Return test vectors of several runs from the start, each step with its own measurements; in every second run some of
+    these come from EDGES."""
     rng, step, keep = np.random.default_rng(seed), Stepper(code), kept_inputs(code)
     flights: list[Vector] = []
     for run in range(RUNS // 3 if code.buffers else RUNS):
@@ -148,7 +148,7 @@ def vectors(code: Code, seed: int = 1) -> list[Vector]:
 
 
 def selftest_rows(cases: list[Vector]) -> str:
-    """Return the rows of the self-test in C, which runs these steps and fails unless every bit agrees."""
+    """Return the lines of the self-test in C, which runs these steps and fails unless every bit agrees."""
     return ",\n".join("    {" + ", ".join([str(int(c.first)), _braced(c.inputs), _braced(c.command), _word(c.digest)]) + "}"
                       for c in cases)  # fmt: skip
 

@@ -28,13 +28,13 @@ FROM_OUTSIDE = True
 
 
 class Gains(NamedTuple):
-    """The gain is a damping."""
+    """The gain is the damping."""
 
     k: Annotated[float, Gain("N m s", above=0.0, text="damping across the field")]
 
 
 class Orbit(NamedTuple):
-    """The form takes the gain from the orbit, because the field must rotate along it before all axes are slowed."""
+    """The form takes the gain from the orbit: the field must rotate along the orbit before all axes are slowed."""
 
     orbit_period: Annotated[float, Gain("s", above=0.0, text="of the orbit")]
     inclination: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="of the orbit to the magnetic equator")]
@@ -44,29 +44,28 @@ FORMS: dict[str, Any] = {"orbit": Orbit}
 
 
 class Memory(NamedTuple):
-    """The field at the call before (T, body axes), and whether there was one."""
+    """The field at the previous call (T, body axes), and whether there was one."""
 
     field: Vector
     known: Scalar
 
 
 def design(craft: Craft, spec: Orbit) -> Gains:
-    """Return k = 2 n (1 + sin i) J_min with n the rate of the orbit: quick, and slow enough not to leave a rate along the
-    field."""
+    """Return k = 2 n (1 + sin i) J_min with n the orbital rate: fast, but slow enough to leave no rate along the field."""
     least = float(np.linalg.eigvalsh(tensor(craft.inertia))[0])
     return Gains(2.0 * math.tau / spec.orbit_period * (1.0 + math.sin(spec.inclination)) * least)
 
 
 def remember(gains: Gains, craft: Craft, period: float) -> Memory:
-    """Return the memory at the start: no field yet."""
+    """Return the initial memory, without a field."""
     return Memory(ZERO, 0.0)
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
-    """Return the torque of the dipole (N m, body)."""
+    """Return the torque of the dipole (N m, body axes)."""
     field = measurement.magnetic_field
     square = dot(field, field)
-    # The field's rate of change needs two measurements.
+    # The rate of change of the field needs two measurements.
     share = where(less(0.0, square), divide(-gains.k / measurement.period, square), 0.0)
     dipole = scale(memory.known * share, subtract(field, memory.field))
     return cross(dipole, field), Memory(field, where(less(0.0, square), 1.0, 0.0))

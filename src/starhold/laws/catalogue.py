@@ -20,7 +20,7 @@ from starhold.parts.part import Part
 
 @dataclass(frozen=True)
 class Law(Part):
-    """A law file as an object; its name is the file's, with hyphens."""
+    """A law file as an object; its name is that of the file, with hyphens."""
 
     @property
     def role(self) -> str:
@@ -29,24 +29,24 @@ class Law(Part):
 
     @property
     def card(self) -> Card:
-        """Title, formula, assumptions and the stability that it claims."""
+        """The law's card: title, formula, assumptions and the stability that it claims."""
         return self.module.CARD
 
     @property
     def body(self) -> str:
-        """The name of the body that it controls: that of its file, or the one whose command it gives."""
+        """The name of the body that it controls: the one named in its file, or the one whose command it computes."""
         return getattr(self.module, "BODY", None) or next(
             name for name, command in _commands().items() if self.hook(command)
         )
 
     @property
     def command(self) -> Callable[..., Any]:
-        """The equation of the command, which the module calls after that of its body: torque, control."""
+        """The equation of the command, named after the command of its body: `torque` or `control`."""
         return getattr(self.module, self.equation)
 
     @property
     def equation(self) -> str:
-        """The module calls the equation of the command by this name."""
+        """The name of the command's equation in the module."""
         return parts.find("body", self.body).module.COMMAND
 
     @property
@@ -56,51 +56,51 @@ class Law(Part):
 
     @property
     def lyapunov(self) -> Callable[..., Any] | None:
-        """The equation of the Lyapunov function, where the law has one."""
+        """The equation of the Lyapunov function; None where the law has none."""
         return getattr(self.module, "lyapunov", None)
 
     @property
     def forms(self) -> dict[str, Any]:
-        """Design forms: name to the NamedTuple class of its inputs."""
+        """Design forms by name, each the NamedTuple class of its inputs."""
         return getattr(self.module, "FORMS", {})
 
     def fields(self, form: str | None = None) -> list[Field]:
-        """The gains in order, or the inputs of a design form."""
+        """Return the fields of the gains in order, or the inputs of a design form."""
         listed = self.hook("fields") if form is None else None
         return fields(self.gains if form is None else self.forms[form]) if listed is None else listed()
 
     def complete(self, spec: Any, start: Callable[[], Start]) -> Any:
-        """The inputs of a design form, completed from the scenario's start."""
+        """Return the inputs of a design form, completed from the scenario's start."""
         teller = getattr(self.module, "complete", None)
         return spec if teller is None else teller(spec, start)
 
     def design(self, craft: Any, spec: Any) -> Any:
-        """Gains from the inputs of a design form."""
+        """Return the gains computed from the inputs of a design form."""
         return self.module.design(craft, spec)
 
     def design_all(self, cases: Sequence[tuple[Any, Any]]) -> list[Any]:
-        """The gains of many crafts and inputs of one form, at once where the law has a way."""
+        """Return the gains for many pairs of craft and inputs of one form, in one pass if the law has `design_all`."""
         together = getattr(self.module, "design_all", None)
         return [self.design(*case) for case in cases] if together is None else together(cases)
 
     def explain(self, craft: Any, spec: Any) -> list[tuple[str, Any]]:
-        """Figures of merit of a design, name and value; none for a law without `explain`."""
+        """Return the figures of merit of a design by name; none for a law without `explain`."""
         teller = getattr(self.module, "explain", None)
         return [] if teller is None else teller(craft, spec)
 
     def check(self, gains: Any, craft: Any) -> None:
-        """Raise ValueError where gains within their bounds make a loop that cannot be stable; not every law checks."""
+        """Raise ValueError for gains within their bounds whose loop cannot be stable; not every law checks this."""
         teller = getattr(self.module, "check", None)
         if teller is not None:
             teller(gains, craft)
 
     def remember(self, gains: Any, craft: Any, period: float) -> Any:
-        """The memory at the start of a run, new for each trajectory."""
+        """Return the initial memory, new for each trajectory."""
         maker = getattr(self.module, "remember", None)
         return NoMemory() if maker is None else maker(gains, craft, period)
 
     def counters(self, memory: Any) -> tuple[int, ...] | None:
-        """Return the counts of a law that iterates: calls, iterations in all, the most in a call, calls that ended
+        """Return the counters of an iterating law: calls, total iterations, most iterations in a call, calls that ended
         without the optimum; None for other laws."""
         teller = getattr(self.module, "counters", None)
         return None if teller is None else teller(memory)
@@ -108,7 +108,7 @@ class Law(Part):
 
 @cache
 def _commands() -> dict[str, str]:
-    """Return for each installed body the name by which its laws call the equation of the command."""
+    """Return the name of the command's equation in laws, for each installed body."""
     return {name: part.module.COMMAND for name, part in parts.parts("body").items()}
 
 
@@ -118,7 +118,7 @@ def _installed() -> dict[str, Law]:
 
 
 def catalogue(body: str = "rigid-body") -> dict[str, Law]:
-    """Return all installed laws for a body, by name. A law of another package that does not load is left out, with a warning
+    """Return all installed laws for a body, by name. A law of another package that does not load is omitted, with a warning
     that names it."""
     return _of_body(body)
 
@@ -146,7 +146,7 @@ _FROM_FILES: dict[str, Law] = {}
 
 
 def known_law(name: str) -> Law | None:
-    """Return the attitude law of this name: the installed one, else the last one read from a file of this name."""
+    """Return the attitude law of this name: the installed one, else the one last read from a file of this name."""
     law = catalogue().get(name, _FROM_FILES.get(name))
     return law if law is None or law.body == "rigid-body" else None
 
@@ -158,7 +158,7 @@ def file_of(name: str) -> Path | None:
 
 
 def from_file(path: Path, known: Mapping[str, Law] | None = None) -> Law:
-    """Return the law in a file, which is executed. `known`: the installed laws, of which it may be one. Errors as in
+    """Execute a file and return its law. `known`: the installed laws, which may include it. Errors as in
     `parts.catalogue.from_file`."""
     law = parts.from_file(path, known or {}, as_law)
     if law.file is not None:
@@ -167,7 +167,7 @@ def from_file(path: Path, known: Mapping[str, Law] | None = None) -> Law:
 
 
 def as_law(module: ModuleType, path: Path | None = None) -> Law:
-    """Return the law in a module. ValueError, in one line, where it lacks a part of the contract."""
+    """Return the law in a module. Raise ValueError, in one line, if it lacks a part of the contract."""
     body = getattr(module, "BODY", None)
     commands = _commands().values() if body is None else [_command_of(body, module, path)]
     if not any(hasattr(module, command) for command in commands):
@@ -184,7 +184,7 @@ def as_law(module: ModuleType, path: Path | None = None) -> Law:
 
 
 def _command_of(body: Any, module: ModuleType, path: Path | None) -> str:
-    """Return the name of the command of a law's body. An unknown body may be in a file of its name beside the law's."""
+    """Return the name of the command of a law's body. An unknown body may be in a file of that name beside the law's."""
     try:
         return parts.find("body", body).module.COMMAND
     except (KeyError, TypeError):

@@ -1,8 +1,7 @@
-"""The tests of which conditions of modes are made: the quantity that each looks at, its level, and whether it holds.
+"""The tests in conditions of modes: the quantity that each tests, its level, and whether it holds.
 
-A test of what is measured takes the law's measurement alone. Others take what flight software keeps (its clock, the Sun's
-place and the turn of the Earth at the start) and what it sees: the state as sensors and estimator give it, readings, and the
-estimate."""
+Some tests need only the law's measurement. Others need what flight software keeps (its clock, the Sun's direction and the
+Earth's rotation angle at the start) and what it sees: the estimated state, the readings, and the estimate."""
 
 from __future__ import annotations
 
@@ -20,11 +19,11 @@ from starhold.parts.epoch import Date, days_of, sidereal, spun, turned
 from starhold.parts.targets.alignment import geodetic
 
 NEVER = 1e12
-"""Control instants since what has not come yet."""
+"""Control instants since an event that has not happened yet."""
 LATITUDE = Gain("rad", at_least=-0.5 * math.pi, at_most=0.5 * math.pi, text="geodetic, of the station")
 LONGITUDE = Gain("rad", at_least=-math.pi, at_most=math.tau, text="of the station, to the east")
 HEIGHT = Gain("m", at_least=-500.0, at_most=9000.0, text="of the station above the ellipsoid")
-AXIS = Gain("1", shape=(3,), spread=False, text="body axis that the angle to the Sun is of")
+AXIS = Gain("1", shape=(3,), spread=False, text="body axis from which the angle to the Sun is taken")
 SETTINGS: Mapping[str, Field] = {
     "latitude": Field("latitude", LATITUDE, True),
     "longitude": Field("longitude", LONGITUDE, True),
@@ -35,7 +34,7 @@ SETTINGS: Mapping[str, Field] = {
 
 
 class Sight(NamedTuple):
-    """Flight software sees this in addition to the law's measurement: the body's state as sensors and estimator give it, the
+    """The inputs of flight software besides the law's measurement: the body's state from sensors and estimator, the
     readings of all sensors, and the estimate."""
 
     state: Any
@@ -44,23 +43,22 @@ class Sight(NamedTuple):
 
 
 class Sky(NamedTuple):
-    """The Sun and the turns of the Earth at the start of a flight."""
+    """The Sun, and the Earth's rotation in turns, at the start of a flight."""
 
     sun: sun.Numbers
     turn: Scalar
 
 
 class Station(NamedTuple):
-    """A station's place (m) and vertical in axes of the Earth."""
+    """A station's position (m) and vertical in Earth-fixed axes."""
 
     place: Vector
     up: Vector
 
 
 class Watch(NamedTuple):
-    """Flight software keeps the control instants since the start, the sky at the start (none where nothing asks for it), the
-    stations that tests are about, in their order, and the control instants since the last new attitude of a star
-    tracker."""
+    """The memory of flight software: the control instants since the start, the sky at the start (none if no test needs it),
+    the stations of the tests in their order, and the control instants since the last new attitude of a star tracker."""
 
     clock: Scalar
     sky: Sky | tuple[()]
@@ -69,9 +67,9 @@ class Watch(NamedTuple):
 
 
 class Tested(NamedTuple):
-    """A quantity that conditions test: its unit and words for it; its value, which may be a rising function of it that costs
-    less, with the same function of a level. settings: further numbers of such a test; reads, estimates: the reading, or the
-    estimate, that it needs; sky: whether it needs the epoch and an orbit about the Earth."""
+    """A quantity that conditions test: its unit and description; its value, or an increasing function of it that is
+    cheaper, with the same function of a level. settings: further numbers of the test; reads, estimates: the reading or
+    estimate that it needs; sky: whether it needs the epoch and an orbit about the Earth."""
 
     unit: str
     text: str
@@ -87,7 +85,7 @@ class Tested(NamedTuple):
 
 
 class Facts:
-    """All that tests look at as a control step begins. Quantities are computed once, when first needed."""
+    """All that tests use at the start of a control step. Quantities are computed once, when first needed."""
 
     def __init__(self, measurement: Measurement, watch: Any = (), sight: Sight | None = None) -> None:
         self.measurement, self.watch, self._sight = measurement, watch, sight
@@ -95,12 +93,12 @@ class Facts:
 
     @property
     def sight(self) -> Sight:
-        """The sight of flight software; only the control step of a loop gives it."""
+        """The view of flight software; available only in the control step of a loop."""
         assert self._sight is not None
         return self._sight
 
     def once(self, name: Any, compute: Callable[[], Any]) -> Any:
-        """A value, computed when it is first asked for."""
+        """Return a value, computed at the first call for `name`."""
         if name not in self._known:
             self._known[name] = compute()
         return self._known[name]
@@ -112,16 +110,16 @@ class Facts:
 
     @property
     def sun(self) -> sun.Sun:
-        """The Sun now."""
+        """The Sun at this time."""
         return self.once("sun", lambda: sun.sun(self.time, self.watch.sky.sun))
 
     def later(self, periods: Scalar, time: Scalar) -> Truth:
-        """Whether this many control periods reach a time (s), to the nearest control instant."""
+        """Return whether this many control periods reach a time (s), to the nearest control instant."""
         period = self.measurement.period
         return less_equal(time - 0.5 * period, periods * period)
 
     def holds(self, test: str, level: Scalar, settings: Mapping[str, Any]) -> Truth:
-        """Whether a test holds."""
+        """Return whether a test holds."""
         if test == "not_before":
             return self.later(self.watch.clock, level)
         if test == "not_after":
@@ -135,7 +133,7 @@ class Facts:
 
 
 def sine_of_half(angle: Scalar) -> Scalar:
-    """The sine of half an angle of up to pi, by its series; 1e-16 off at most."""
+    """Return the sine of half an angle (rad) of up to pi, by its series, with an error of at most 1e-16."""
     x = 0.25 * angle * angle
     total = 1.0
     for n in range(20, 0, -2):
@@ -180,7 +178,7 @@ def _attitude_deviation(now: Facts, _: Mapping[str, Any]) -> Scalar:
 
 
 def _elevation(now: Facts, settings: Mapping[str, Any]) -> Scalar:
-    """The sine of the elevation at which a station sees the craft."""
+    """Return the sine of the elevation at which a station sees the craft."""
     cosine, sine = now.once("turn", lambda: cosine_sine(turned(now.watch.sky.turn, now.time)))
     station: Station = settings["station"]
     ahead = subtract(now.sight.state.position, spun(station.place, cosine, sine))
@@ -188,7 +186,7 @@ def _elevation(now: Facts, settings: Mapping[str, Any]) -> Scalar:
 
 
 def _away_from_sun(now: Facts, settings: Mapping[str, Any]) -> Scalar:
-    """The cosine of the angle between a body axis and the direction away from the Sun."""
+    """Return the cosine of the angle between a body axis and the direction away from the Sun."""
     axis = settings["axis"]
     return -dot(axis, to_body(now.sight.state.attitude, now.sun.direction)) / norm(axis)
 
@@ -246,7 +244,7 @@ TESTED: Mapping[str, Tested] = {
     ),
     "attitude_deviation": Tested(
         "rad",
-        "the norm of the deviations that the estimator states for its attitude",
+        "the norm of the standard deviations of the estimator's attitude",
         _attitude_deviation,
         estimates="attitude_deviation",
     ),
@@ -258,18 +256,18 @@ TIMES: Mapping[str, Gain] = {
     "not_after": Gain("s", above=0.0, text="since the start, or a date: it holds until then"),
 }
 TESTS = (*MEASURED, *TIMES)
-"""Each measured quantity below or above a level, and the time."""
+"""Names of all tests: each measured quantity below or above a level, and the time."""
 ENDS = ("rate_below", "body_rate_below", "angle_below")
-"""The tests that bound where a mode ends."""
+"""The tests that bound the state in which a mode ends."""
 
 
 def quantity_of(test: str) -> Tested | None:
-    """The quantity that a test looks at; None for the time."""
+    """Return the quantity of a test; None for the time."""
     return None if test in TIMES else TESTED[test.rpartition("_")[0]]
 
 
 def level_of(test: str) -> Gain:
-    """The declaration of a test's level."""
+    """Return the declaration of a test's level."""
     tested = quantity_of(test)
     if tested is None:
         return TIMES[test]
@@ -278,34 +276,34 @@ def level_of(test: str) -> Gain:
 
 
 def settings_of(tests: Iterable[str]) -> tuple[str, ...]:
-    """The further numbers of these tests."""
+    """Return the declarations of the further numbers of these tests."""
     needed = {key for test in tests if (tested := quantity_of(test)) for key in tested.settings}
     return tuple(key for key in SETTINGS if key in needed)
 
 
 def watches(tests: Iterable[str]) -> bool:
-    """Whether one of these tests looks beyond the law's measurement."""
+    """Return whether one of these tests needs more than the law's measurement."""
     return any((tested := quantity_of(test)) is None or tested.watched for test in tests)
 
 
 def needs_sky(tests: Iterable[str]) -> bool:
-    """Whether one of these tests needs the Sun or the turn of the Earth."""
+    """Return whether one of these tests needs the Sun or the Earth's rotation."""
     return any((tested := quantity_of(test)) is not None and tested.sky for test in tests)
 
 
 def sky_at(epoch: Date, ephemeris: int = 0) -> Sky:
-    """The sky at the start; ephemeris: how the Sun moves, as parts are given it. ValueError for an epoch that is no date, or
-    not from 1950 to 2050."""
+    """Return the sky at the start; ephemeris: the model of the Sun, as for parts. Raise ValueError for an epoch that is no
+    date or lies outside 1950 to 2050."""
     return Sky(sun.prepared(epoch, ephemeris), sidereal(days_of(epoch)))
 
 
 def station_at(settings: Mapping[str, Any]) -> Station:
-    """The station of a test's settings."""
+    """Return the station in the settings of a test."""
     return Station(*geodetic(settings["latitude"], settings["longitude"], settings["height"]))
 
 
 def advanced(watch: Watch, sight: Sight) -> Watch:
-    """The watch as the next control step begins."""
+    """Return the watch at the start of the next control step."""
     fix = watch.fix + 1.0
     new = [less(0.5, reading.attitude_is_new) for reading in sight.readings if hasattr(reading, "attitude_is_new")]
     for one in new:

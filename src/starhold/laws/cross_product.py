@@ -1,4 +1,4 @@
-"""Only the component of PD feedback perpendicular to the magnetic field acts: magnetorquers can give no other."""
+"""PD feedback by magnetorquers: only the component perpendicular to the magnetic field acts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Gains(NamedTuple):
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Return the torque of the dipole (N m, body)."""
+    """Return the torque of the dipole (N m, body axes)."""
     field = measurement.magnetic_field
     square = dot(field, field)
     feedback = add(scale(gains.k_rate, measurement.rate), scale(gains.k_attitude, vector_part(measurement.attitude)))

@@ -1,13 +1,13 @@
-"""Laws of attitude control: the measurement that they take, and the declarations of a law file.
+"""Attitude control laws: their measurement, and the declarations in a law file.
 
-A law file holds `CARD`, `class Gains(NamedTuple)`, the equation `torque(measurement, gains, craft, memory) -> (torque,
+A law file contains `CARD`, `class Gains(NamedTuple)`, the equation `torque(measurement, gains, craft, memory) -> (torque,
 memory)` and `examples()`. It may add `lyapunov(measurement, gains, craft)`, design forms (`FORMS` with `design(craft,
-spec)`, `complete(spec, start)` for inputs that the scenario gives, and `design_all(cases)` for many pairs of craft and
-spec, if that is faster than one after another), `check(gains, craft)` that refuses gains that cannot be stable,
-`remember(gains, craft, period)` for a memory that is not empty, `plan(gains, craft, period)` for the proof of one whose
-torque is the first move of a plan (`predictive.free.Plan`), and `record(memory, period)` for its recorded
-quantities, a NamedTuple whose fields are annotated with `Quantity`. `FROM_OUTSIDE = True`: the torque has to come from
-outside the spacecraft, as that of magnetorquers does and that of wheels does not.
+spec)`, `complete(spec, start)` for inputs taken from the scenario, and `design_all(cases)` for many pairs of craft and
+spec, where that is faster than one by one), `check(gains, craft)` that refuses gains that cannot be stable,
+`remember(gains, craft, period)` for a memory that is not empty, `plan(gains, craft, period)` for proofs about a torque that
+is the first move of a plan (`predictive.free.Plan`), and `record(memory, period)` for its recorded quantities, a NamedTuple
+whose fields are annotated with `Quantity`. `FROM_OUTSIDE = True`: the torque must be external to the spacecraft, as that of
+magnetorquers is and that of wheels is not.
 """
 
 from __future__ import annotations
@@ -30,15 +30,14 @@ Claim: TypeAlias = Literal["global", "almost-global", "local", "none"]
 
 @dataclass(frozen=True)
 class Card(contract.Card):
-    """Title, formula, sources and assumptions of a law, the stability that it claims, and facts that its users need."""
+    """The card of a law: title, formula, sources, assumptions, claimed stability, and facts that its users need."""
 
     claims: Claim
-    """The stability that is claimed: global, almost-global, local or none; where it is any, the assumptions are not
-    empty."""
+    """The claimed stability: global, almost-global, local or none; any claim needs assumptions."""
     quaternion_sign: Literal["odd", "even"] = "odd"
     """odd: feeding back -q in place of q changes the torque; even: it does not."""
     rest_tolerance: float = 0.0
-    """Largest torque (N m) at rest on target; zero but for laws that solve a problem to a tolerance."""
+    """Largest torque (N m) at rest on target; zero except for laws that solve a problem to a tolerance."""
 
 
 Gain = Parameter
@@ -46,7 +45,7 @@ Gain = Parameter
 
 
 def tracking_torque(measurement: Measurement, craft: Craft) -> Vector:
-    """The torque (N m) that makes the motion relative to a moving target obey the equations of a target at rest,
+    """Return the torque (N m) under which the motion relative to a moving target obeys the equations for a target at rest,
     J w_e' + w_e x J w_e = rest of the torque; zero for a target at rest."""
     gyroscopic = subtract(
         gyroscopic_torque(craft.inertia, measurement.body_rate), gyroscopic_torque(craft.inertia, measurement.rate)

@@ -1,4 +1,4 @@
-"""A circle around the line through the libration point is made attractive as a set of states, not as a motion in time."""
+"""Makes a circle around the line through the libration point attractive as a set of states, not as a motion in time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LAYER = Gain(at_least=0.0, dimension="velocity", text="velocity error within whi
 
 
 class Gains(NamedTuple):
-    """The gains give the circle, how strongly it attracts, and the feedback along X; all scaled."""
+    """The circle, the feedback towards it, and the feedback along X; all scaled."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     rate: Annotated[float, Gain(dimension="rate", text="at which it is followed, from Y to Z; negative the other way")]
@@ -35,7 +35,7 @@ class Gains(NamedTuple):
     k_velocity: Annotated[float, Gain(above=0.0, text="on the velocity along X")]
     feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
     boundary_layer: Annotated[float, LAYER] = 0.0
-    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: also cancels the nonlinear remainder")] = 0
 
 
 class Best(NamedTuple):
@@ -46,27 +46,27 @@ class Best(NamedTuple):
     k: Annotated[float, Gain(above=0.0, text="feedback on the velocity error; size of a relay's thrust")] = 1.0
     feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
     boundary_layer: Annotated[float, LAYER] = 0.0
-    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: also cancels the nonlinear remainder")] = 0
 
 
 FORMS: dict[str, Any] = {"best": Best}
 
 
 def design(plant: Libration, spec: Best) -> Gains:
-    """Take rate = sqrt(C - 2 Omega^2), at which the peak demand is 2 Omega sqrt(C - Omega^2) radius. ValueError for less
-    C."""
+    """Return gains with rate = sqrt(C - 2 Omega^2), at which the peak demand is 2 Omega sqrt(C - Omega^2) radius. Raise
+    Raise ValueError if C is not above 2 Omega^2."""
     rate, growth = least_rate(plant), plant.rate**2 + 2.0 * plant.stiffness
     x = (2.0 * growth, 2.0 * math.sqrt(growth))
     return Gains(spec.radius, rate, spec.alpha, spec.k, *x, spec.feedback, spec.boundary_layer, spec.model)
 
 
 def check(gains: Gains, plant: Libration) -> None:
-    """Raise ValueError where X is unstable."""
+    """Raise ValueError if motion along X is unstable."""
     check_x(gains.k_x, gains.k_velocity, plant)
 
 
 def explain(plant: Libration, spec: Best) -> list[tuple[str, Any]]:
-    """Return figures of the control that the circle demands."""
+    """Return the rate of the circle and figures of the control that it demands."""
     rate = design(plant, spec).rate
     peak = peak_demand(plant, rate) * spec.radius
     return [("rate", rate), ("period (of the turning axes)", plant.rate / abs(rate)), ("peak demand (scaled)", peak)]
@@ -116,7 +116,7 @@ def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memor
 
 
 def lyapunov(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Scalar:
-    """Return V = (alpha f1^2 + f2^2 + f3^2)/2, zero on the circle; V' = -k (f2^2 + f3^2), of a relay -k |(f2, f3)|."""
+    """Return V = (alpha f1^2 + f2^2 + f3^2)/2, zero on the circle; V' = -k (f2^2 + f3^2), or -k |(f2, f3)| with a relay."""
     off = errors(measurement, gains)
     return 0.5 * (gains.alpha * off[0] * off[0] + off[1] * off[1] + off[2] * off[2])
 

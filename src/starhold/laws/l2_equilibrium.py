@@ -1,4 +1,4 @@
-"""The law holds an equilibrium beside the libration point, where the panels see the Sun past the smaller body."""
+"""Holds an equilibrium beside the libration point, where the smaller body does not hide the Sun from the panels."""
 
 from __future__ import annotations
 
@@ -20,29 +20,30 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """The gains give the equilibrium, and the feedback of each axis; all scaled."""
+    """The equilibrium, and the feedback of each axis; all scaled."""
 
     y: Annotated[float, Gain(dimension="length", text="equilibrium along Y, lengths")]
     z: Annotated[float, Gain(dimension="length", text="equilibrium along Z, lengths")]
     k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
     k_velocity: Annotated[Vector, Gain(shape=(3,), text="on the velocity, by axis")]
-    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: also cancels the nonlinear remainder")] = 0
 
 
 class Degree(NamedTuple):
-    """The form gives the feedback of the largest decay rate (degree of stability) that leaves the natural stiffness along Y
-    and Z alone."""
+    """The form gives the feedback of the largest decay rate (degree of stability) that does not change the natural
+    stiffness along Y and Z."""
 
     y: Annotated[float, Gain(dimension="length", text="equilibrium along Y, lengths")] = 0.0
     z: Annotated[float, Gain(dimension="length", text="equilibrium along Z, lengths")] = 0.0
-    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
+    model: Annotated[int, Gain(choices=MODELS, text="nonlinear: also cancels the nonlinear remainder")] = 0
 
 
 FORMS: dict[str, Any] = {"degree": Degree}
 
 
 def design(plant: Libration, spec: Degree) -> Gains:
-    """Place the double root -s along X, x'' = s^2 x + u; along Y and Z the natural frequency, critically damped."""
+    """Return gains with the double root -s along X, where x'' = s^2 x + u, and critical damping at the natural frequency
+    along Y and Z."""
     square = plant.rate**2
     x, y, z = square + 2.0 * plant.stiffness, plant.stiffness - square, plant.stiffness
     velocity = (2.0 * math.sqrt(x), 2.0 * math.sqrt(y), 2.0 * math.sqrt(z))
@@ -50,7 +51,7 @@ def design(plant: Libration, spec: Degree) -> Gains:
 
 
 def check(gains: Gains, plant: Libration) -> None:
-    """Raise ValueError where X is unstable, or the velocity along Y or Z is not fed back."""
+    """Raise ValueError if motion along X is unstable, or the velocity along Y or Z is not fed back."""
     check_x(gains.k_x, gains.k_velocity[0], plant)
     if min(gains.k_velocity) <= 0.0:
         raise ValueError("k_velocity must be above 0 on every axis, or motion along it does not die out")
@@ -73,10 +74,10 @@ def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memor
 
 
 def rest(gains: Gains) -> Vector:
-    """Return the equilibrium."""
+    """Return the equilibrium (scaled)."""
     return (0.0, gains.y, gains.z)
 
 
 def examples() -> list[Gains]:
-    """Return gains for the Sun and the Earth, one Earth diameter aside."""
+    """Return gains for the Sun and the Earth, one Earth diameter off the line."""
     return [Gains(1.0, 0.0, 17.8, (6.0, 3.4, 4.0)), Gains(0.0, 1.0, 17.8, (6.0, 3.4, 4.0), 1)]

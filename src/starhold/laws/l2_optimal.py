@@ -1,7 +1,7 @@
-"""Among all controls within the limit the law takes the one under which a chosen V decreases fastest. V compares the
-velocity with one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with f1 = y^2 + z^2 -
-radius^2. With pull = 0 it would be the V of `l2-circle`, and a control of full size would hold any circle near the intended
-one, because there that V is constant whatever the control.
+"""Among all controls within the limit, chooses the one under which a given V decreases fastest. V compares the velocity
+with one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with f1 = y^2 + z^2 - radius^2. With
+pull = 0 it would be the V of `l2-circle`, and full control would hold any circle near the intended one, because there that
+V is constant for every control.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """The gains give the circle and the weights of V; all scaled."""
+    """The circle and the weights of V; all scaled."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     rate: Annotated[float, Gain(dimension="rate", text="at which it is followed, from Y to Z; negative the other way")]
@@ -37,7 +37,7 @@ class Gains(NamedTuple):
 
 
 class Best(NamedTuple):
-    """The form takes the rate that needs the least control on the circle, and along X the natural rate."""
+    """The form takes the rate that needs the least control on the circle, and the natural rate along X."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
@@ -50,7 +50,7 @@ FORMS: dict[str, Any] = {"best": Best}
 
 
 def design(plant: Libration, spec: Best) -> Gains:
-    """Take rate = sqrt(C - 2 Omega^2), slope = sqrt(Omega^2 + 2 C). ValueError where C is less than 2 Omega^2."""
+    """Return gains with rate = sqrt(C - 2 Omega^2), slope = sqrt(Omega^2 + 2 C). Raise ValueError if C < 2 Omega^2."""
     rates = least_rate(plant), math.sqrt(plant.rate**2 + 2.0 * plant.stiffness)
     return Gains(spec.radius, rates[0], spec.alpha, spec.beta, rates[1], spec.pull, spec.boundary_layer)
 

@@ -54,7 +54,7 @@ Array = NDArray[np.floating[Any]]
 
 
 class Gains(NamedTuple):
-    """The gains are damping and stiffness matrices, and the share of the gyroscopic torque that is cancelled."""
+    """Damping and stiffness matrices, and the share of the gyroscopic torque that is cancelled."""
 
     k_rate: Annotated[Matrix | Vector, Gain("N m s", shape=(3, 3), text="damping")]
     k_attitude: Annotated[Matrix | Vector, Gain("N m", shape=(3, 3), text="stiffness")]
@@ -71,26 +71,26 @@ class FormI(NamedTuple):
 
 
 class FormII(NamedTuple):
-    """The weights Q and R are diagonal for a diagonal inertia, and the gains in closed form. Weights of one unit differ by
-    at most 1e12."""
+    """The weights Q and R are diagonal, for a diagonal inertia, and the gains have a closed form. Weights of the same unit
+    differ by a factor of at most 1e12."""
 
     q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
-    balance: Annotated[int, Gain(choices=BALANCES, text="which weights move to make the law globally stable")] = 0
+    balance: Annotated[int, Gain(choices=BALANCES, text="whose weights change to make the law globally stable")] = 0
 
 
 class FormIII(NamedTuple):
-    """The weights are those of form II about the principal axes of any inertia, which are taken in the order of rising
-    moments; axes of equal moments need equal weights unless the inertia is diagonal."""
+    """The weights are those of form II about the principal axes of any inertia, in ascending order of moments; axes of
+    equal moments need equal weights unless the inertia is diagonal."""
 
     q: Annotated[Any, Gain("1", above=0.0, shape=(6,), text="weights of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Vector, Gain("1/(N m)^2", above=0.0, shape=(3,), text="weights of the torque")]
-    balance: Annotated[int, Gain(choices=BALANCES, text="which weights move to make the law globally stable")] = 0
+    balance: Annotated[int, Gain(choices=BALANCES, text="whose weights change to make the law globally stable")] = 0
 
 
 class Numeric(NamedTuple):
-    """The weights are any symmetric positive definite ones, by a numerical solution that is right to the last digit.
-    Eigenvalues of weights of one unit differ by at most 1e12."""
+    """The weights are any symmetric positive definite ones; the gains come from a numerical solution that is correct to the
+    last digit. Eigenvalues of weights of the same unit differ by a factor of at most 1e12."""
 
     q: Annotated[Any, Gain("1", shape=(6, 6), text="weight of the rate (s^2) and of the quaternion's vector part")]
     r: Annotated[Any, Gain("1/(N m)^2", shape=(3, 3), text="weight of the torque")]
@@ -110,9 +110,9 @@ lyapunov = matrix_pd.lyapunov
 
 
 def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
-    """Return gains of a form; ValueError where the weights or the inertia do not allow it.
+    """Return the gains of a form. Raise ValueError if the weights or the inertia do not allow it.
 
-    The gains of forms I, II and III are exactly symmetric, and so are those of numeric weights that make them so."""
+    Gains that are symmetric in theory, such as those of forms I, II and III, are exactly symmetric."""
     inertia, share = tensor(craft.inertia), 0.0
     with np.errstate(all="ignore"):
         if isinstance(spec, FormI):
@@ -133,8 +133,8 @@ def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
 
 
 def design_all(cases: Sequence[tuple[Craft, Any]]) -> list[Gains]:
-    """Return the gains of many crafts and inputs of one form, each those of `design`: at once for forms II and III with
-    diagonal inertias and weights as given, whose axes do not touch one another."""
+    """Return the gains for many pairs of craft and inputs of one form, equal to those of `design`. Forms II and III with
+    diagonal inertias and without `balance` decouple the axes and are solved in one pass."""
     closed = all(isinstance(spec, FormII | FormIII) and not spec.balance for _, spec in cases)
     if not (closed and all(isinstance(craft.inertia[0], float) for craft, _ in cases)):
         return [design(*case) for case in cases]
@@ -145,18 +145,18 @@ def design_all(cases: Sequence[tuple[Craft, Any]]) -> list[Gains]:
         order = np.broadcast_to(np.arange(3)[:, None], order.shape)
     with np.errstate(all="ignore"):
         sorted_gains = np.array(closed_form(np.take_along_axis(moments, order, 0), q, r))
-        # Back from the order of the axes to that of the body.
+        # Back from the order of the principal axes to that of the body axes.
         gains: Array = np.take_along_axis(sorted_gains, np.argsort(order, axis=0)[None], 1)
         fine = (np.vstack([q, r]) > 0.0).all() and all(spread(part).max() <= MOST_SPREAD for part in (q[:3], q[3:], r))
-        # What is to be refused, `design` refuses with its reason.
+        # `design` refuses invalid cases and gives the reason.
         if not (fine and (gains > 0.0).all() and np.isfinite(2.0 * gains).all()):
             return [design(*case) for case in cases]
     return [Gains(vector(k_rate), vector(k_attitude)) for k_rate, k_attitude in zip(gains[0].T, gains[1].T, strict=True)]
 
 
 class Solution(NamedTuple):
-    """A closed form solves its Riccati equation about the principal axes (the columns of `axes`), where all is diagonal:
-    moments (3,), weights q (6,), rate first, and r (3,), and P's blocks, each (3,)."""
+    """The closed-form solution of the Riccati equation about the principal axes (the columns of `axes`), where all matrices
+    are diagonal: moments (3,), weights q (6,), rate first, and r (3,), and the blocks of P, each (3,)."""
 
     moments: Array
     axes: Array
@@ -173,7 +173,7 @@ class Solution(NamedTuple):
 
 
 def solution(craft: Craft, spec: FormI | FormII | FormIII) -> Solution:
-    """Return the closed form's solution. Form I is the regulator for any R; the identity stands for it here."""
+    """Return the closed-form solution. Form I is optimal for any R; here R is the identity."""
     inertia = tensor(craft.inertia)
     if isinstance(spec, FormI):
         moments, axes = principal(inertia)
@@ -188,8 +188,8 @@ def solution(craft: Craft, spec: FormI | FormII | FormIII) -> Solution:
 
 
 def riccati_problem(craft: Craft, spec: FormI | FormII | FormIII) -> tuple[Array, Array, Array]:
-    """Return weights Q (6, 6), rate first, and R (3, 3) of a form and its P (6, 6), in body axes; form I has the
-    identity for R."""
+    """Return the weights Q (6, 6), rate first, and R (3, 3) of a form, and its P (6, 6), in body axes; for form I, R is the
+    identity."""
     closed = solution(craft, spec)
     both = np.kron(np.eye(2), closed.axes)
     return both * closed.q @ both.T, closed.axes * closed.r @ closed.axes.T, both @ closed.p @ both.T
@@ -208,7 +208,7 @@ def explain(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> list[tupl
         power = gyroscopic_residual(inertia, k_attitude)
     else:
         closed = solution(craft, spec)
-        # About the principal axes: turned into the body's, small entries drown in the rounding of large ones.
+        # About the principal axes: in body axes, small entries would be lost in the rounding of large ones.
         about = (closed.p, np.diag(closed.moments), np.diag(closed.q), np.diag(closed.r))
         others = zip(closed[4:], scipy_axes(closed.moments, closed.q, closed.r), strict=True)
         figures.append(("P", riccati_problem(craft, spec)[2]))
@@ -246,7 +246,7 @@ def _turned(axes: Array, diagonal: Array) -> Array:
 
 
 def _without_rounding(gain: Array) -> Array:
-    """Return the matrix, made symmetric where it is symmetric up to the rounding of the weights."""
+    """Return the matrix, made exactly symmetric if it is symmetric up to rounding."""
     if np.abs(gain - gain.T).max() <= 1e-14 * np.abs(gain).max():
         return 0.5 * (gain + gain.T)
     return gain
@@ -260,17 +260,17 @@ def gyroscopic_residual(inertia: Array, k_attitude: Array) -> float:
     weight = axes.T @ np.linalg.inv(k_attitude) @ axes
     if np.abs(weight - np.diag(np.diagonal(weight))).max() <= 1e-12 * np.abs(weight).max():
         return abs(kappa(moments, 1.0 / np.diagonal(weight))) / (3.0 * np.sqrt(3.0))
-    # Not diagonal together: the maximum over a fine grid of directions is an estimate and no bound.
+    # If not both are diagonal, the maximum over a fine grid of directions is an estimate, not a bound.
     random = np.random.default_rng(0).normal(size=(20_000, 3))
     rates = random / np.linalg.norm(random, axis=1, keepdims=True)
     return float(np.abs(np.einsum("ki,ij,kj->k", rates, weight, np.cross(rates, rates * moments))).max())
 
 
 def balanced(moments: Array, spec: FormII | FormIII) -> tuple[Array, Array]:
-    """Return weights q (6,) and r (3,) for moments (3,), moved to where kappa vanishes if `spec.balance` says so.
+    """Return weights q (6,) and r (3,) for moments (3,), with those named by `spec.balance` changed so that kappa vanishes.
 
-    ValueError where kappa vanishes for no value of the named weight (that of the middle moment's axis always can), and
-    where weights, given or moved, are not positive or differ by more than MOST_SPREAD."""
+    Raise ValueError if kappa vanishes for no value of the named weight (for the axis of the middle moment it always does),
+    and if weights, given or changed, are not positive or differ by a factor above MOST_SPREAD."""
     q, r = positive(spec.q, 6, "q"), positive(spec.r, 3, "r")
     check_spreads(q[:3], q[3:], r)
     if BALANCES[spec.balance] != "none":

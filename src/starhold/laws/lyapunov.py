@@ -1,4 +1,4 @@
-"""PD feedback acts with the gyroscopic and the modelled external torque cancelled."""
+"""PD feedback with the gyroscopic torque and the modelled external torque cancelled."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ design, explain, design_all = response.designs(Gains, torque)
 
 
 def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
-    """Return V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -k_rate |w|2."""
+    """Return V = w.Jw/2 + 2 k_attitude (1 - q0) (J); V' = -k_rate |w|^2."""
     energy = 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate))
     return energy + 2.0 * gains.k_attitude * (1.0 - measurement.attitude[0])
 

@@ -1,4 +1,4 @@
-"""PD feedback has matrix gains here, with the two classical families that make it stable."""
+"""PD feedback with matrix gains, and the two classical families of stabilising gains."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Gains(NamedTuple):
 
 
 class Inertial(NamedTuple):
-    """The family is K_attitude = (a J + b E)^-1, K_rate = d J, for any inertia."""
+    """Gains K_attitude = (a J + b E)^-1, K_rate = d J, for any inertia."""
 
     a: Annotated[float, Gain("1/(N m kg m^2)", at_least=0.0, text="weight of the inertia in K_attitude^-1")]
     b: Annotated[float, Gain("1/(N m)", at_least=0.0, text="weight of the identity in K_attitude^-1")]
@@ -45,7 +45,7 @@ class Inertial(NamedTuple):
 
 
 class Diagonal(NamedTuple):
-    """The family is K_attitude = (a J + b E)^-1, K_rate = diag(d1, d2, d3) J, for a diagonal inertia."""
+    """Gains K_attitude = (a J + b E)^-1, K_rate = diag(d1, d2, d3) J, for a diagonal inertia."""
 
     a: Annotated[float, Gain("1/(N m kg m^2)", at_least=0.0, text="weight of the inertia in K_attitude^-1")]
     b: Annotated[float, Gain("1/(N m)", at_least=0.0, text="weight of the identity in K_attitude^-1")]
@@ -56,7 +56,7 @@ FORMS: dict[str, Any] = {"inertial": Inertial, "diagonal": Diagonal}
 
 
 def design(craft: Craft, spec: Inertial | Diagonal) -> Gains:
-    """Return the gains of one of the two classical families; ValueError if its stability condition is violated."""
+    """Return the gains of one of the two classical families. Raise ValueError if its stability condition is violated."""
     inertia = tensor(craft.inertia)
     if spec.a == 0.0 and spec.b == 0.0:
         raise ValueError("a and b must not both be zero")
@@ -79,7 +79,7 @@ def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
 
 
 def examples() -> list[Gains]:
-    """Return stiffness a multiple of the identity (b alone), for any inertia, with a diagonal and a full damping."""
+    """Return gains for any inertia: stiffness a multiple of the identity (b alone), and a diagonal or full damping."""
     stiffness = (0.009, 0.009, 0.009)
     full = ((0.09, 0.01, 0.0), (0.01, 0.12, 0.02), (0.0, 0.02, 0.15))
     return [Gains((0.09, 0.12, 0.15), stiffness), Gains(full, stiffness)]

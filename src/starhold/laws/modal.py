@@ -1,4 +1,4 @@
-"""Modal control places the poles of the motion exactly, level by level, linearising it again at every step."""
+"""Modal control places the poles of the motion exactly, level by level, and linearises it again at every step."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Equal(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """The form takes the root that slews fastest within limits, from a fit over the initial angle; the default is the
+    """The form takes the root of the fastest slew within limits, from a fit over the initial angle; the default is the
     published fit."""
 
     angle: Annotated[
@@ -75,12 +75,12 @@ FORMS: dict[str, Any] = {"equal": Equal, "fit": Fit}
 
 
 def complete(spec: Equal | Fit, start: Callable[[], Start]) -> Equal | Fit:
-    """Return the inputs of a form, with the error angle (rad) at the start where they give none."""
+    """Return the inputs of a form, completed with the error angle (rad) at the start if they have none."""
     return spec._replace(angle=start().angle) if isinstance(spec, Fit) and spec.angle is None else spec
 
 
 def design(craft: Craft, spec: Equal | Fit) -> Gains:
-    """Set phi_0 = phi_1 = a E. ValueError for a fit without an angle."""
+    """Return gains with phi_0 = phi_1 = a E. Raise ValueError for a fit without an angle."""
     if isinstance(spec, Equal):
         a = spec.a
     elif spec.angle is None:
@@ -94,8 +94,8 @@ def design(craft: Craft, spec: Equal | Fit) -> Gains:
 
 
 def fitted(angle: ArrayLike, below: Vector, above: Vector, split: float) -> NDArray[np.float64]:
-    """Return c exp(d angle) + e (1/s) of an angle (rad; numbers or an array), by one triple up to the split and another
-    beyond."""
+    """Return c exp(d angle) + e (1/s) at an angle (rad; number or array), with one triple up to the split and another
+    beyond it."""
     first, second = (c * np.exp(d * np.asarray(angle, dtype=float)) + e for c, d, e in (below, above))
     return np.where(np.asarray(angle) <= split, first, second)
 
@@ -127,12 +127,12 @@ def single_root(gains: Gains) -> tuple[float, float] | None:
 
 def _straighten(q: Vector, v: Vector) -> Vector:
     """Return D^-1 v with D v = v + q x v."""
-    # D v = v + q x v is regular for every q, and needs no pivot.
+    # D is regular for every q, and needs no pivoting.
     return scale(1.0 / (1.0 + dot(q, q)), add(subtract(v, cross(q, v)), scale(dot(q, v), q)))
 
 
 def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest: Vector) -> Vector:
-    """Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|2, if the momentum were its
+    """Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|^2 if the momentum were its
     input."""
     half = apply(craft.inertia, _straighten(q, w))
     doubled = scale(2.0, apply(craft.inertia, _straighten(q, rest)))
@@ -144,8 +144,8 @@ def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Return the control torque (N m, body).
 
-    With x' = (q0', q') the level above gives K_0 x = K_1 x' - phi_0 (K_1 (q0 - 1, q) + J w) beside the known torque, whose
-    Jacobians cancel. Nothing is divided by w: where it vanishes, the scalar part has no pole of its own to place."""
+    With x' = (q0', q') the upper level gives K_0 x = K_1 x' - phi_0 (K_1 (q0 - 1, q) + J w) in addition to the known
+    torque, whose Jacobians cancel. There is no division by w: where w vanishes, the scalar part has no pole to place."""
     q, w = vector_part(measurement.attitude), measurement.rate
     turning = derivative(measurement.attitude, w)
     steered = _upper(q, w, gains, craft, measurement.attitude[0] - 1.0, q)

@@ -1,7 +1,7 @@
-"""A supervisor switches between laws: each mode has one, and conditions on the measurement begin another mode.
+"""A supervisor switches between laws: each mode has a law, and conditions on the measurement begin another mode.
 
-At a control instant the conditions of the present mode are evaluated, and the law of the mode that they lead to commands,
-so the state in which a mode begins fulfils its switch's condition. A mode's law begins with its initial memory each time.
+At a control instant the conditions of the present mode are evaluated, and the law of the resulting mode commands, so the
+state in which a mode begins satisfies the condition of its switch. A mode's law begins with its initial memory each time.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from starhold.laws.monitors import Guard, Monitor, watched
 from starhold.parts.epoch import EPOCH
 
 NAME = "modes"
-"""The type of such a law in a scenario."""
+"""The name of this type of law in a scenario."""
 AFTER = Gain("s", at_least=0.0, text="least time in the mode")
-DWELL = Gain("s", at_least=0.0, text="time for which all of it must have held without a break")
+DWELL = Gain("s", at_least=0.0, text="time for which the whole condition must have held without a break")
 WHEELS_LOST = Gain("1", at_least=1.0, text="how many wheels must be diagnosed as lost for the mode to begin")
 
 
 class Switch(NamedTuple):
-    """A switch begins another mode (`to`, counted from 0) once all tests have held for a while; `key`: "until" or "back"."""
+    """A switch begins another mode (`to`, counted from 0) once all tests have held for a time; `key`: "until" or "back"."""
 
     key: str
     to: int
@@ -58,8 +58,8 @@ class Switch(NamedTuple):
 
 
 class Mode(NamedTuple):
-    """A mode has a name, a law, switches to other modes, of which the last one due counts, and the names of the
-    effectors that work in it (None: all)."""
+    """A mode: its name, its law, its switches to other modes, of which the last one due takes effect, and the names of the
+    effectors active in it (None: all)."""
 
     name: str
     law: Law
@@ -67,13 +67,13 @@ class Mode(NamedTuple):
     effectors: tuple[str, ...] | None = None
 
     def has(self, effector: str) -> bool:
-        """Whether an effector of this name works in the mode."""
+        """Return whether an effector of this name is active in the mode."""
         return self.effectors is None or effector in self.effectors
 
 
 class Memory(NamedTuple):
-    """The law remembers the mode, counted from 0, its age in control periods, for how many control instants each of its
-    switches has held, and the memories of the laws, present and initial."""
+    """The memory of the supervisor: the mode, counted from 0, its age in control periods, the number of control instants
+    for which each of its switches has held, and the present and initial memories of the laws."""
 
     mode: float
     age: float
@@ -81,14 +81,14 @@ class Memory(NamedTuple):
     memories: tuple[Any, ...]
     fresh: tuple[Any, ...]
     watch: Any = ()
-    """A `Watch`, where a condition or a monitor looks beyond the law's measurement."""
+    """A `Watch`, if a condition or a monitor needs more than the law's measurement."""
     losses: Any = ()
-    """`Losses`, where a mode begins on a loss."""
+    """`Losses`, if a mode begins on a loss."""
 
 
 class Losses(NamedTuple):
-    """Losses are remembered: what the monitors keep, how many more wheels there were to lose, how often a loss was noticed,
-    and the monitor that is tripped, counted from 1 (0: none)."""
+    """The memory of losses: memories of the monitors, the number of wheels that may still be lost, the number of losses
+    noticed, and the tripped monitor, counted from 1 (0: none)."""
 
     guards: tuple[Guard, ...]
     left: float
@@ -97,14 +97,14 @@ class Losses(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """The mode is recorded."""
+    """The recorded quantities of a law of modes."""
 
     mode: Annotated[float, Quantity("1", "mode that commands, counted from 1")]
     time_in_mode: Annotated[float, Quantity("s", "since that mode began")]
 
 
 class LossSample(NamedTuple):
-    """The mode is recorded, with the losses that flight software noticed."""
+    """The recorded quantities of a law of modes, with the losses that flight software noticed."""
 
     mode: Annotated[float, Quantity("1", "mode that commands, counted from 1")]
     time_in_mode: Annotated[float, Quantity("s", "since that mode began")]
@@ -114,18 +114,18 @@ class LossSample(NamedTuple):
 
 @dataclass(frozen=True)
 class Modes:
-    """A law of modes has this for a module, with all that a law file holds; equal for the same modes with any gains."""
+    """The module of a law of modes, with all that a law file contains; equal for the same modes with any gains."""
 
     modes: tuple[Mode, ...]
     on_loss: int | None = None
-    """The mode, counted from 0, that begins where wheels are lost or a monitor trips."""
+    """The mode, counted from 0, that begins when wheels are lost or a monitor trips."""
     monitors: tuple[Monitor, ...] = ()
     ephemeris: int = 0
-    """How the Sun of conditions moves, as the scenario gives it to parts."""
+    """The model of the Sun's motion in conditions, as for parts."""
 
     @property
     def CARD(self) -> Card:  # noqa: N802
-        """The law's card; its quaternion sign is even only where that of every mode is."""
+        """The law's card; its quaternion sign is even only if that of every mode is."""
         laws = [mode.law for mode in self.modes]
         return Card(
             title="Modes",
@@ -138,7 +138,7 @@ class Modes:
 
     @property
     def READS(self) -> tuple[str, ...]:  # noqa: N802
-        """The readings that any mode's law, a condition or a monitor needs."""
+        """The readings that a mode's law, a condition or a monitor needs."""
         needed = [name for mode in self.modes for name in mode.law.reads]
         return tuple(dict.fromkeys((*needed, *self.SEVERAL)))
 
@@ -164,28 +164,28 @@ class Modes:
 
     @property
     def WATCHES(self) -> bool:  # noqa: N802
-        """Whether a condition or a monitor looks beyond the law's measurement."""
+        """Whether a condition or a monitor needs more than the law's measurement."""
         return self.on_loss is not None or watches(self.tests)
 
     @property
     def ABOUT(self) -> str:  # noqa: N802
-        """The body, by its name, that the craft must orbit for the conditions to have a meaning."""
+        """The name of the body that the craft must orbit for the conditions to have a meaning."""
         return "Earth" if needs_sky(self.tests) else ""
 
     @property
     def Gains(self) -> Any:  # noqa: N802
-        """The class of the gains: those of all modes, one after the other, each followed by its switches' numbers."""
+        """The class of the gains: those of all modes in order, each followed by the numbers of its switches."""
         return _gains_of(self)
 
     def fields(self) -> list[Field]:
-        """The gains in order, under the keys that they have in the law's table."""
+        """The fields of the gains in order, under their keys in the law's table."""
         listed: list[Field] = []
         for place, mode in enumerate(self.modes, 1):
             listed += [replace(item, name=f"mode[{place}].{item.name}") for item in _mode_fields(mode)]
         return listed + [replace(item, name=name.format(".")) for name, item in self.shared_fields()]
 
     def shared_fields(self) -> list[tuple[str, Field]]:
-        """The numbers that no single mode has, each with its name, in which {} stands for what divides it."""
+        """The numbers that belong to no single mode, each with its name, in which {} stands for the separator."""
         shared = [("epoch", Field("epoch", EPOCH, True))] if needs_sky(self.tests) else []
         if self.on_loss is not None:
             shared.append(("wheels_lost", Field("wheels_lost", WHEELS_LOST, False, 1.0)))
@@ -194,14 +194,14 @@ class Modes:
         return shared
 
     def parts(self, gains: Any) -> Iterator[tuple[Mode, Any, list[tuple[Switch, Any]]]]:
-        """Each mode with the gains of its law, and its switches with their numbers."""
+        """Return each mode with the gains of its law, and its switches with their numbers."""
         left = iter(gains)
         for mode in self.modes:
             law_gains = mode.law.gains(*(next(left) for _ in mode.law.fields()))
             yield mode, law_gains, [(s, [next(left) for _ in _numbers(s)]) for s in mode.switches]
 
     def remember(self, gains: Any, craft: Any, period: float) -> Memory:
-        """The memory at the start, in the first mode."""
+        """Return the initial memory, in the first mode."""
         now, fresh = (tuple(mode.law.remember(its, craft, period) for mode, its, _ in self.parts(gains)) for _ in range(2))
         slots = max(len(mode.switches) for mode in self.modes)
         watch = losses = ()
@@ -215,8 +215,8 @@ class Modes:
         return Memory(0.0, -1.0, (0.0,) * slots, now, fresh, watch, losses)
 
     def decide(self, measurement: Measurement, gains: Any, memory: Memory, sight: Sight | None = None) -> Memory:
-        """The memory with the mode that commands at this control instant. sight: what flight software sees, which laws take
-        that have `WATCHES`."""
+        """Return the memory with the mode that commands at this control instant. sight: what flight software sees, for laws
+        with `WATCHES`."""
         age = memory.age + 1.0
         watch = advanced(memory.watch, sight) if sight is not None else memory.watch
         now = Facts(measurement, watch, sight)
@@ -249,8 +249,8 @@ class Modes:
         return Memory(following, where(switched, 0.0, age), instants, memories, memory.fresh, watch, losses)
 
     def _noticed(self, gains: Any, losses: Losses, now: Facts, mode: Scalar) -> tuple[Truth, Losses]:
-        """Whether a mode is to begin because of a loss in this one: as long as a monitor is tripped, and as the last wheel
-        is lost of those that may be. A monitor restarts with its modes."""
+        """Return whether the loss mode begins, and the new memory of losses: it begins while a monitor is tripped, and when
+        the last wheel that may be lost is lost. A monitor restarts with its modes."""
         guards, tripped = list[Guard](), 0.0
         numbers = iter(gains[len(gains) - 2 * len(self.monitors) :])
         for place, (monitor, guard) in enumerate(zip(self.monitors, losses.guards, strict=True), 1):
@@ -258,7 +258,7 @@ class Modes:
             if monitor.modes:
                 looks = reduce(either, (_is(mode, one) for one in monitor.modes))
                 truth, guard = both(looks, truth), chosen(looks, guard, monitor.at_start)
-            # The first of them is told.
+            # The first tripped monitor is recorded.
             tripped = where(both(truth, less(tripped, 0.5)), float(place), tripped)
             guards.append(guard)
         wheels = both(less(gains.wheels_lost, 0.5), less(gains.wheels_lost, losses.left - 0.5))
@@ -268,7 +268,7 @@ class Modes:
         return either(wheels, now_tripped), Losses(tuple(guards), gains.wheels_lost, trips, tripped)
 
     def command(self, measurement: Measurement, gains: Any, craft: Any, memory: Memory) -> tuple[Any, Memory]:
-        """The command of the present mode."""
+        """Return the command of the present mode, and the new memory."""
         command, memories = ZERO, list[Any]()
         for place, (mode, its, _) in enumerate(self.parts(gains)):
 
@@ -280,11 +280,11 @@ class Modes:
         return command, memory._replace(memories=tuple(memories))
 
     def torque(self, measurement: Measurement, gains: Any, craft: Any, memory: Memory) -> tuple[Any, Memory]:
-        """The torque (N m, body) of the mode that begins or continues."""
+        """Return the torque (N m, body axes) of the mode that begins or continues, and the new memory."""
         return self.command(measurement, gains, craft, self.decide(measurement, gains, memory))
 
     def inactive(self, effector: str, memory: Memory) -> Truth | None:
-        """Whether an effector of this name is inactive in the present mode; None for one that is active in all."""
+        """Return whether an effector of this name is inactive in the present mode; None for one that is active in all."""
         resting: Truth | None = None
         for place, mode in enumerate(self.modes):
             if not mode.has(effector):
@@ -293,28 +293,28 @@ class Modes:
         return resting
 
     def record(self, memory: Memory, period: Scalar) -> Sample | LossSample:
-        """The recorded quantities."""
+        """Return the recorded quantities."""
         mode = Sample(memory.mode + 1.0, maximum(memory.age, 0.0) * period)
         return mode if self.on_loss is None else LossSample(*mode, memory.losses.trips, memory.losses.tripped)
 
     def check(self, gains: Any, craft: Any) -> None:
-        """ValueError where a mode's gains make a loop that cannot be stable."""
+        """Raise ValueError for gains of a mode whose loop cannot be stable."""
         for mode, its, _ in self.parts(gains):
             mode.law.check(its, craft)
 
     def examples(self) -> list[Any]:
-        """Return none: a scenario has the gains."""
+        """Return no examples: a scenario has the gains."""
         return []
 
 
 def make_law(modes: Modes) -> Law:
-    """The law of these modes."""
+    """Return the law of these modes."""
     module: Any = modes
     return Law(NAME, module)
 
 
 def mode_laws(law: Law, gains: Any) -> list[tuple[str, Law, Any]]:
-    """Name, law and gains of each mode of a law; none for a law without modes."""
+    """Return name, law and gains of each mode of a law; none for a law without modes."""
     if not isinstance(law.module, Modes):
         return []
     return [(mode.name, mode.law, its) for mode, its, _ in law.module.parts(gains)]
@@ -325,7 +325,7 @@ def _is(mode: Scalar, place: int) -> Truth:
 
 
 def _renewed(begins: Truth, kept: Any, fresh: Any) -> Any:
-    """Return a law's memory, or its initial one as its mode begins."""
+    """Return a law's memory, or its initial one when its mode begins."""
     for present, first in zip(buffers(kept), buffers(fresh), strict=True):
 
         def copy(present: Buffer = present, first: Buffer = first) -> None:
@@ -339,14 +339,14 @@ def _renewed(begins: Truth, kept: Any, fresh: Any) -> Any:
 
 
 def _numbers(switch: Switch) -> list[Field]:
-    """The numbers of a switch under its keys."""
+    """Return the fields of a switch under its keys."""
     waits = [Field("after", AFTER, False, 0.0), Field("dwell", DWELL, False, 0.0)]
     settings = [SETTINGS[key] for key in settings_of(switch.tests)]
     return [*waits, *(Field(test, level_of(test), True) for test in switch.tests), *settings]
 
 
 def _mode_fields(mode: Mode) -> list[Field]:
-    """The gains of a mode's law, and its switches' numbers."""
+    """Return the fields of the gains of a mode's law, and of its switches."""
     switched = [
         Field(f"{s.key}.{item.name}", item.gain, item.required, item.default) for s in mode.switches for item in _numbers(s)
     ]

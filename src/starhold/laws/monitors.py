@@ -1,5 +1,5 @@
-"""Monitors detect failures: each looks at a reading or an estimate, and trips where that is out of range, changes too fast,
-is stuck, or differs too much from what the estimator computes."""
+"""Monitors detect failures: each watches a reading or an estimate, and trips when the value is out of range, changes too
+fast, is stuck, or differs too much from the estimate."""
 
 from __future__ import annotations
 
@@ -17,43 +17,43 @@ from starhold.laws.interface import Field, Gain
 Kind: TypeAlias = Literal["range", "rate", "stuck", "residual"]
 KINDS: dict[Kind, str] = {
     "range": "largest size",
-    "rate": "largest change in a second, from one value to the next that differs",
+    "rate": "largest change per second, from one value to the next that differs",
     "stuck": "longest time without a change",
     "residual": "largest difference of a new reading from the estimate",
 }
-"""A monitor is of one of these kinds; each comes with the meaning of its limit."""
-TIMES = Gain("1", at_least=1.0, text="how many values in a row, or instants of a range, must be beyond the limit")
+"""The kinds of monitors, each with the meaning of its limit."""
+TIMES = Gain("1", at_least=1.0, text="how many values in a row, or instants for a range, must be beyond the limit")
 
 
 class Monitor(NamedTuple):
-    """A monitor has a name, a kind, the name of a reading or of what is estimated, its unit, and the place of the sensor,
-    from 0, among those that give the reading (None: it is estimated)."""
+    """A monitor: its name, its kind, the name of a reading or an estimated quantity, its unit, and the index of the sensor,
+    from 0, among those that give the reading (None for an estimate)."""
 
     name: str
     kind: Kind
     watches: str
     unit: str
     size: int = 1
-    """How many numbers that has: 4 for an attitude, whose unit is rad."""
+    """Number of components of the quantity: 4 for an attitude, whose unit is rad."""
     sensor: int | None = 0
     modes: tuple[int, ...] = ()
-    """The modes in which it looks, counted from 0; () for all."""
+    """The modes in which it is active, counted from 0; () for all."""
 
     def fields(self) -> list[Field]:
-        """Its numbers under their keys."""
+        """The fields of its numbers under their keys."""
         unit = "s" if self.kind == "stuck" else f"{self.unit}/s" if self.kind == "rate" else self.unit
         limit = Gain(unit.replace("s/s", "s^2"), above=0.0, text=KINDS[self.kind])
         return [Field("limit", limit, True), Field("times", TIMES, False, 1.0)]
 
     @property
     def at_start(self) -> Guard:
-        """The memory of it at the start."""
+        """The initial memory of the monitor."""
         return Guard(0.0 if self.size == 1 else (0.0,) * self.size, -1.0, 0.0)
 
 
 class Guard(NamedTuple):
-    """A monitor remembers the last value, for how many control instants that has stood (-1: there is none as yet), and how
-    many values in a row were beyond the limit."""
+    """The memory of a monitor: the last value, the number of control instants since it changed (-1: no value yet), and the
+    number of values in a row beyond the limit."""
 
     value: Any
     stood: Scalar
@@ -61,7 +61,7 @@ class Guard(NamedTuple):
 
 
 def value_of(monitor: Monitor, now: Facts) -> Any:
-    """The value that a monitor looks at."""
+    """Return the value that a monitor watches."""
     if monitor.sensor is None:
         return getattr(now.sight.estimate, monitor.watches)
     there = [reading for reading in now.sight.readings if hasattr(reading, monitor.watches)]
@@ -69,7 +69,7 @@ def value_of(monitor: Monitor, now: Facts) -> Any:
 
 
 def watched(monitor: Monitor, guard: Guard, now: Facts, limit: Scalar, times: Scalar) -> tuple[Truth, Guard]:
-    """Whether a monitor is tripped at this control instant, and what it remembers."""
+    """Return whether a monitor is tripped at this control instant, and its new memory."""
     value, period = value_of(monitor, now), now.measurement.period
     first, changed = less(guard.stood, -0.5), _differ(value, guard.value)
     new, elapsed = either(first, changed), (guard.stood + 1.0) * period
@@ -89,7 +89,7 @@ def watched(monitor: Monitor, guard: Guard, now: Facts, limit: Scalar, times: Sc
 
 
 def _differ(a: Any, b: Any) -> Truth:
-    """Whether two values differ in any number."""
+    """Return whether two values differ in any number."""
     truths = [either(less(x, y), less(y, x)) for x, y in zip(_numbers(a), _numbers(b), strict=True)]
     return reduce(either, truths)
 
@@ -99,15 +99,15 @@ def _numbers(value: Any) -> tuple[Scalar, ...]:
 
 
 def _size(value: Any) -> Scalar:
-    """The size of a number or of a vector."""
+    """Return the absolute value of a number, or the norm of a vector."""
     numbers = _numbers(value)
     return absolute(numbers[0]) if len(numbers) == 1 else norm(cast(Vector, numbers))
 
 
 def _apart(a: Any, b: Any, limit: Scalar) -> Truth:
-    """Whether two values are farther apart than a limit; two attitudes by the angle (rad) between them."""
+    """Return whether two values differ by more than a limit; for attitudes, by the angle (rad) between them."""
     if len(_numbers(a)) == 4:
-        # No two attitudes are farther apart than half a turn.
+        # Two attitudes differ by at most half a turn.
         most = where(less(limit, math.pi), sine_of_half(minimum(limit, math.pi)), 2.0)
         return less(most, half_angle_sine(relative(b, a)))
     return less(limit, _size(tuple(x - y for x, y in zip(_numbers(a), _numbers(b), strict=True))))

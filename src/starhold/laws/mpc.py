@@ -1,4 +1,4 @@
-"""Model-predictive control plans the best sequence of moves over a horizon inside the torque limit, and applies the
+"""Model-predictive control plans the optimal sequence of moves over a horizon within the torque limit, and applies the
 first."""
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CARD = Card(
         "rigid body",
         "inertia known",
         "no external torque but the gravity gradient",
-        "small attitude error, or a horizon short against the turn",
+        "small attitude error, or a horizon short compared with the slew",
     ),
     claims="local",
 )
@@ -41,7 +41,7 @@ BALL, UNLIMITED = LIMITS.index("norm"), LIMITS.index("none")
 
 
 class Gains(NamedTuple):
-    """The gains are weights of the cost, the horizon and limits. Choices are given by their index in the list."""
+    """Weights of the cost, horizon and limits. Choices are given by their index in the list."""
 
     q_attitude: Annotated[Vector, Gain("1", above=0.0, shape=(3,), text="weight of the quaternion's vector part")]
     q_rate: Annotated[Vector, Gain("s^2", at_least=0.0, shape=(3,), text="weight of the rate")]
@@ -49,17 +49,18 @@ class Gains(NamedTuple):
     horizon: Annotated[int, Gain(at_least=1, at_most=500, whole=True, text="moves planned ahead")] = 10
     terminal: Annotated[int, Gain(choices=TERMINALS, text="weight of the state after the last move: Riccati, Q or 0")] = 0
     limit: Annotated[int, Gain(choices=LIMITS, text="how the craft's torque limit is respected")] = 0
-    budget: Annotated[int, Gain(at_least=1, at_most=10000, whole=True, text="most Riccati sweeps a call")] = 50
+    budget: Annotated[int, Gain(at_least=1, at_most=10000, whole=True, text="most Riccati sweeps in a call")] = 50
 
 
 CALLS, SWEEPS, WORST, EXHAUSTED, SHAPED = range(COUNTERS)
-"""Indices of the counters: calls, Riccati sweeps in all, most sweeps in a call, calls that ended at the budget without the
-optimum, and whether limits shaped the last plan (1) or not (0), which decides how the next call starts."""
+"""Indices of the counters: calls, total Riccati sweeps, most sweeps in a call, calls that used up the budget without
+reaching the optimum, and whether limits were active in the last plan (1, else 0), which decides how the next call
+starts."""
 
 
 class Memory(NamedTuple):
-    """The law keeps the numbers of its program between calls, changed in place and new for each trajectory, see
-    `predictive.problem`."""
+    """The numbers of the quadratic program (see `predictive.problem`), changed in place from call to call and new for each
+    trajectory."""
 
     numbers: Buffer
 
@@ -67,7 +68,7 @@ class Memory(NamedTuple):
 def remember(gains: Gains, craft: Craft, period: float) -> Memory:
     """Return the memory of one trajectory, for control instants `period` apart (s).
 
-    Raises ValueError where the Riccati equation of the terminal weight has no solution in double precision."""
+    Raise ValueError if the Riccati equation of the terminal weight has no solution in double precision."""
     terminal, tail = terminal_weight(gains, craft.inertia, period)
     memory = Memory(Buffer([0.0] * size(gains.horizon)))
     store = carve(program(gains, memory))
@@ -83,7 +84,7 @@ def program(gains: Gains, memory: Memory) -> Problem:
 
 
 def counters(memory: Memory) -> tuple[int, ...]:
-    """Return the counters of a memory, outside kernels: see CALLS."""
+    """Return the counters of a memory, outside kernels; see CALLS."""
     return tuple(int(memory.numbers[place]) for place in range(COUNTERS))
 
 
@@ -94,7 +95,7 @@ def terminal_weight(gains: Gains, moments: Matrix | Vector, period: float) -> tu
     = -feedback x. For "riccati" they are those of the infinite horizon at w = 0 without gravity.
 
     Raises ValueError where the Riccati equation has no solution in double precision."""
-    # In periods and in a typical torque, so that the weights of any craft are of comparable size.
+    # In units of the period and of a typical torque, so that the weights of any craft have comparable size.
     inertia = tensor(moments)
     typical = np.trace(inertia) / 3.0
     push = typical * np.linalg.inv(inertia)
@@ -105,7 +106,7 @@ def terminal_weight(gains: Gains, moments: Matrix | Vector, period: float) -> tu
     name = TERMINALS[gains.terminal]
     p: Any = q if name == "stage" else np.zeros((6, 6))
     if name == "riccati":
-        # Loaded only here, where it is needed; by name because its types are too loose for a strict checker.
+        # Loaded only here, where it is needed, and by name, because its types are too loose for a strict checker.
         riccati = import_module("scipy.linalg").solve_discrete_are
         try:
             p = riccati(a, b, q, r)
@@ -124,7 +125,7 @@ def terminal_weight(gains: Gains, moments: Matrix | Vector, period: float) -> tu
 
 
 def plan(gains: Gains, craft: Craft, period: float) -> Plan:
-    """Return what the law plans, for proofs. Errors as of `remember`."""
+    """Return the law's plan, for proofs. Errors as in `remember`."""
     end, _ = terminal_weight(gains, craft.inertia, period)
     order = [3, 4, 5, 0, 1, 2]
     end, state = end[np.ix_(order, order)], (*gains.q_rate, *gains.q_attitude)
@@ -134,8 +135,8 @@ def plan(gains: Gains, craft: Craft, period: float) -> Plan:
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
-    """Return the control torque (N m, body): the first move of the best plan. Weights and horizon are those the memory was
-    made for; the memory is changed."""
+    """Return the control torque (N m, body axes), the first move of the optimal plan. Weights and horizon must be those of
+    `remember`; the memory is changed."""
     problem = program(gains, memory)
     store = carve(problem)
     ahead = tracking_torque(measurement, craft)
@@ -147,7 +148,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory)
     store.states.put(0, (*vector_part(measurement.attitude), *measurement.rate))
     _count(store, improve(problem, gains.budget, warm))
     command = add(triple(store.plan, 0), ahead)
-    # Adding the tracking torque back rounds; the limit is kept exactly.
+    # Adding the tracking torque back rounds; clipping keeps the limit exactly.
     return (clip_norm if problem.ball else clip_axes)(command, bound), memory
 
 
@@ -165,6 +166,6 @@ def _count(store: Store, end: Solved) -> None:
 
 
 def examples() -> list[Gains]:
-    """Return the published weights within a limit on each axis, and within a limit on the norm."""
+    """Return the published weights, with a limit on each axis and with a limit on the norm."""
     q, r = (0.2, 0.2, 0.2), (50.0, 50.0, 50.0)
     return [Gains(q, q, r, limit=LIMITS.index("axis")), Gains(q, q, r, limit=LIMITS.index("norm"))]

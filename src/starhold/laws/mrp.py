@@ -1,4 +1,4 @@
-"""Feedback acts on modified Rodrigues parameters, those of the rotation below 180 degrees."""
+"""Feedback on the modified Rodrigues parameters of the rotation below 180 degrees."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """The gains are damping and stiffness; for small angles the parameters are a quarter of the angle."""
+    """Damping and stiffness; for small angles the parameters are a quarter of the angle."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the modified Rodrigues parameters")]

@@ -1,4 +1,4 @@
-"""Proportional-derivative feedback acts on the quaternion."""
+"""Proportional-derivative feedback on the quaternion."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Gains(NamedTuple):
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
-    limit: Annotated[int, Gain(choices=("none", "axis"), text="axis: damping clipped to what k_attitude leaves")] = 0
+    limit: Annotated[int, Gain(choices=("none", "axis"), text="axis: damping clipped to the torque left by k_attitude")] = 0
 
 
 def remember(gains: Gains, craft: Craft, period: float) -> NoMemory:
-    """Remember nothing; ValueError where stiffness leaves no torque for the damping."""
+    """Return the empty memory. Raise ValueError if stiffness leaves no torque for the damping."""
     if gains.limit and not gains.k_attitude < craft.torque_limit < math.inf:
         shown = f"the torque limit of {craft.torque_limit:g} N m"
         raise ValueError(f'limit = "axis" needs k_attitude below {shown}, not {gains.k_attitude:g} N m')

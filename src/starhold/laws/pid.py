@@ -23,14 +23,14 @@ CARD = Card(
         "torque not limited",
         "k_rate k_attitude > J_max k_integral",
         "small attitude error, rate and integral",
-        "control period short against the loop's time constants",
+        "control period short compared with the loop's time constants",
     ),
     claims="local",
 )
 
 
 class Gains(NamedTuple):
-    """The gains are damping, stiffness, the integral gain, and the largest torque of the integral."""
+    """Damping, stiffness, the integral gain, and the largest torque of the integral."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[float, Gain("N m", above=0.0, text="stiffness against the quaternion's vector part")]
@@ -41,16 +41,16 @@ class Gains(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The law keeps the integral of the error quaternion's vector part (s)."""
+    """The integral of the error quaternion's vector part (s)."""
 
     integral: Vector
 
 
 def check(gains: Gains, craft: Craft) -> None:
-    """Raise ValueError where the linear loop is not stable.
+    """Raise ValueError if the linear loop is not stable.
 
-    About a principal axis of moment J its polynomial is J s^3 + k_rate s^2 + k_attitude/2 s + k_integral/2; by Routh's
-    criterion it is stable where k_rate k_attitude > J k_integral, which is hardest about the axis of the largest moment."""
+    About a principal axis of moment J its characteristic polynomial is J s^3 + k_rate s^2 + k_attitude/2 s + k_integral/2;
+    by Routh's criterion it is stable if k_rate k_attitude > J k_integral, hardest for the largest moment."""
     most = gains.k_rate * gains.k_attitude / principal_moments(craft.inertia)[2]
     if not gains.k_integral < most:
         allowed = f"k_rate k_attitude / J_max = {most:.6g} N m/s"
@@ -58,16 +58,16 @@ def check(gains: Gains, craft: Craft) -> None:
 
 
 def remember(gains: Gains, craft: Craft, period: float) -> Memory:
-    """The flight starts with an integral of zero."""
+    """Return the initial memory: an integral of zero."""
     return Memory(ZERO)
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
     """Return the control torque (N m, body)."""
     q = vector_part(measurement.attitude)
-    # Anti-windup: the integral is clamped, not held while the torque is limited. It winds up in a slew that reaches no limit
-    # too, and a law does not know whether the limit is of each axis, of the norm or of the wheels. The clamp bounds the
-    # overshoot in every case, and leaves enough for the disturbance that it is sized for.
+    # Anti-windup: the integral is clamped, not frozen while the torque is saturated. It also winds up in a slew that
+    # reaches no limit, and a law does not know whether each axis, the norm or the wheels are limited. The clamp bounds the
+    # overshoot in every case, and leaves enough torque for the disturbance for which it is sized.
     grown = add(memory.integral, scale(measurement.period, q))
     integral = clip_axes(grown, gains.integral_limit / gains.k_integral)
     proportional = add(scale(gains.k_rate, measurement.rate), scale(gains.k_attitude, q))
@@ -76,5 +76,5 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory)
 
 
 def examples() -> list[Gains]:
-    """Return gains for a body of a few kg m2, the second near the border of stability and soon at the integral's limit."""
+    """Return gains for a body of a few kg m2, the second near the stability boundary and soon at the integral's limit."""
     return [Gains(0.3, 0.03, 3e-4, 2e-3), Gains(0.5, 0.05, 5e-3, 1e-4)]

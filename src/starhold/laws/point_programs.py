@@ -1,4 +1,4 @@
-"""Gives the kernel programs and numbers of a craft near a libration point."""
+"""The kernel's programs and numbers for a craft near a libration point."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from starhold.trace.straight_line import labelled, straight_line
 
 
 def point_programs(law: Law, gains: Any, craft: Libration, full: bool, limit: str) -> dict[str, dict[str, Any]]:
-    """Return the programs by role: the field, the law, how its control is limited, and the set that it declares to make
-    attractive: errors that vanish with their V, or an equilibrium."""
+    """Return the programs by role: the vector field, the law, its control limit, and the set that it is to make attractive,
+    which is given by errors that vanish on it and their V, or is an equilibrium."""
     measurement = ASKED["libration-point"]
     programs = {
         "field": straight_line(nonlinear if full else linear, position=ZERO, velocity=ZERO, plant=craft),
@@ -32,6 +32,6 @@ def point_programs(law: Law, gains: Any, craft: Libration, full: bool, limit: st
 
 
 def point_subject(gains: Any, craft: Libration, known: Libration) -> dict[str, str]:
-    """Return the exact numbers that the programs may read: gains, the craft's and those of the law's model of it."""
+    """Return the exact numbers that the programs may read: the gains, the craft, and the law's nominal model."""
     named = [*labelled("gains", gains), *labelled("plant", craft), *labelled("craft", known)]
     return {name: x.hex() for name, x in named if isfinite(x)}

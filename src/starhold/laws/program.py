@@ -1,5 +1,5 @@
-"""A law as a program of the proof kernel. Its digest is in certificates, exported C, runs and the report, and so ties the
-program that flies to the one proved."""
+"""A law as a program of the proof kernel. Its digest in certificates, exported C, runs and the report ties the program that
+flies to the one proved."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ ASKED: dict[str, Any] = {
     "rigid-body": Measurement((1.0, *ZERO), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, ZERO, ZERO, 0.0, 1.0),
     "libration-point": PointMeasurement(ZERO, ZERO, 0.0, 0.0),
 }
-"""For each body a measurement with every number an input."""
+"""For each body, a measurement in which every number is an input."""
 
 
 def law_program(law: Law, gains: Any, craft: Any, period: float, remembers: bool = False) -> dict[str, Any]:
-    """Return a law's command as a program; gains and craft are inputs but for choices and whole numbers. remembers: so is
-    the memory, and the new one stands behind the command; else it is that of the start. Errors as of `straight_line`."""
+    """Return a law's command as a program; gains and craft are inputs, except for choices and integers. remembers: the
+    memory is an input too, and the new memory follows the command in the output; else the memory is the initial one. Errors
+    as in `straight_line`."""
     memory = law.remember(gains, craft, period)
     if remembers:
         return straight_line(law.command, measurement=ASKED[law.body], gains=gains, craft=craft, memory=memory)
@@ -37,7 +38,7 @@ def law_program(law: Law, gains: Any, craft: Any, period: float, remembers: bool
 
 
 def planned_program(plan: Plan, craft: Any) -> dict[str, Any]:
-    """Return the torque of a plan's first move where its limits shape none, as a program; the craft is an input."""
+    """Return the torque of a plan's first move, with no limit active, as a program; the craft is an input."""
 
     def command(measurement: Any, craft: Any) -> Any:
         return first_move(measurement, plan.free[0], craft)
@@ -46,7 +47,7 @@ def planned_program(plan: Plan, craft: Any) -> dict[str, Any]:
 
 
 def law_digest(law: Law, gains: Any, craft: Any, period: float) -> str:
-    """Return the SHA-256 of a law's program; empty for a law that keeps a memory, or has no such program."""
+    """Return the SHA-256 of a law's program; empty for a law with a memory, or without such a program."""
     if law.body not in ASKED or any(True for _ in leaves(law.remember(gains, craft, period))):
         return ""
     try:

@@ -1,4 +1,4 @@
-"""Sliding-mode control holds the surface w + K q = 0."""
+"""Sliding-mode control on the surface w + K q = 0."""
 
 from __future__ import annotations
 
@@ -38,8 +38,7 @@ SURFACE = Gain("1/s", shape=(3, 3), text="K of the surface w + K q = 0, symmetri
 
 
 class Gains(NamedTuple):
-    """The gains are the surface slope, the switching torque and, to trade chatter for accuracy, the thickness of a boundary
-    layer."""
+    """The surface gain, the switching gain and, to trade accuracy for less chatter, the thickness of a boundary layer."""
 
     surface_gain: Annotated[Matrix | Vector, SURFACE]
     switching_gain: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="switching torque, above the disturbance")]
@@ -47,20 +46,19 @@ class Gains(NamedTuple):
 
 
 class Layered(NamedTuple):
-    """The form takes the natural frequency and damping of the linear loop within a boundary layer, which has two real roots,
-    those of the surface and of the layer. Exact about every axis for a diagonal inertia, whose reaching torques are in
-    proportion to the moments; else exact about the axis of the largest moment, and faster about the others."""
+    """The form takes the natural frequency and damping ratio of the linear loop in a boundary layer, which has two real
+    roots, those of the surface and of the layer. It is exact about every axis for a diagonal inertia, whose reaching
+    torques are in proportion to the moments; else exact about the axis of the largest moment, and faster about the
+    others."""
 
-    bandwidth: Annotated[
-        float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="natural frequency, the least of all axes")
-    ]
+    bandwidth: Annotated[float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="lowest natural frequency of all axes")]
     switching_gain: Annotated[float, Gain("N m", above=0.0, text="switching torque about the axis of the largest moment")]
     damping: Annotated[float, Gain("1", at_least=1.0, text="damping ratio; 1: a double root")] = 1.0
 
 
 class Settling(NamedTuple):
-    """The form takes the least slope that settles in time within the available torque, by integrating the slew to a
-    target at rest without external torque."""
+    """The form takes the smallest surface gain that settles in time within the available torque, by integrating the slew to
+    a target at rest without external torque."""
 
     time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
     switching_gain: Annotated[
@@ -80,7 +78,7 @@ FORMS: dict[str, Any] = {"bandwidth": Layered, "settling": Settling}
 
 
 def complete(spec: Layered | Settling, start: Callable[[], Start]) -> Layered | Settling:
-    """Return the inputs of a form; one for a settling time is completed from the scenario's start."""
+    """Return the inputs of a form; the form for a settling time is completed from the scenario's start."""
     spec = response.complete(spec, start)
     if isinstance(spec, Layered) or spec.switching_gain is not None:
         return spec

@@ -1,4 +1,4 @@
-"""Super-twisting control is a sliding mode of second order on s = w + K q, whose torque is continuous."""
+"""Super-twisting control: a second-order sliding mode on s = w + K q with a continuous torque."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CARD = Card(
         "inertia known",
         "each component of d/dt J^-1 M_ext at most L: L < k2 where k1 >= 4 k2, else L^2 < k1/4 (2 k2 - k1/4)",
         "torque not limited",
-        "control period short: s is held to the order of its square",
+        "control period short: s stays within the order of its square",
         "q0 > 0 on the surface",
     ),
     claims="local",
@@ -31,7 +31,7 @@ CARD = Card(
 
 
 class Gains(NamedTuple):
-    """The gains are the surface slope and those of the reaching motion s' = -sqrt(k1 |s|) sign(s) + v + disturbance."""
+    """The surface gain, and the gains of the reaching motion s' = -sqrt(k1 |s|) sign(s) + v + disturbance."""
 
     surface_gain: Annotated[Matrix | Vector, SURFACE]
     k1: Annotated[Vector, Gain("rad/s^3", above=0.0, shape=(3,), text="under the root: s vanishes in about 2 sqrt(s/k1)")]
@@ -39,22 +39,22 @@ class Gains(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The law keeps v (rad/s2), which on the surface is the negative of the acceleration that the disturbance makes."""
+    """v (rad/s2), which on the surface is minus the acceleration due to the disturbance."""
 
     acceleration: Vector
 
 
 def remember(gains: Gains, craft: Craft, period: float) -> Memory:
-    """The flight starts with v = 0."""
+    """Return the initial memory, v = 0."""
     return Memory(ZERO)
 
 
 def check(gains: Gains, craft: Craft) -> None:
-    """Raise ValueError where motion on the surface, q' = -K q/2 near the target, diverges from it."""
+    """Raise ValueError if motion on the surface, q' = -K q/2 near the target, diverges from the target."""
     slope: Any = gains.surface_gain
     backwards: Any = tuple(scale(-1.0, row) for row in slope) if isinstance(slope[0], tuple) else scale(-1.0, slope)
     if not decays(backwards):
-        raise ValueError("surface_gain must have eigenvalues with positive real parts, or the surface leads off the target")
+        raise ValueError("surface_gain needs eigenvalues with positive real parts, or the surface leads off the target")
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:
@@ -69,7 +69,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory)
 
 
 def examples() -> list[Gains]:
-    """Return gains for a body of a few kg m2 with 1e-2 N m: one slope for all axes, and a full matrix."""
+    """Return gains for a body of a few kg m2 with 1e-2 N m: one surface gain for all axes, and a full matrix."""
     slanted = ((0.08, 0.01, 0.0), (0.01, 0.1, 0.0), (0.0, 0.0, 0.12))
     plain = Gains((0.08, 0.08, 0.08), (1.2e-4, 1.2e-4, 1.2e-4), (3e-5, 3e-5, 3e-5))
     return [plain, Gains(slanted, (4e-4, 3e-4, 2e-4), (6e-5, 8e-5, 5e-5))]

@@ -1,4 +1,4 @@
-"""Feedback acts on the direction cosines, with the momentum of the wheels and the modelled torque compensated."""
+"""Feedback on the direction cosines, with the momentum of the wheels and the modelled torque compensated."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ SHARE = Gain("1", at_least=0.0, at_most=1.0, text="share of the gyroscopic, targ
 
 
 class Gains(NamedTuple):
-    """The gains are damping, stiffness, and the share of the modelled torque that is compensated."""
+    """Damping, stiffness, and the share of the modelled torque that is compensated."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
-    k_attitude: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="weights of 1 - a_ii, one for all or one each")]
+    k_attitude: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="weights of 1 - a_ii: one, or one per axis")]
     compensation: Annotated[float, SHARE] = 1.0
 
 
@@ -48,15 +48,15 @@ FORMS: dict[str, Any] = {"degree-of-stability": Stability}
 
 
 def design(craft: Craft, spec: Stability) -> Gains:
-    """Return the gains of the largest decay rate (degree of stability); ValueError if angle and rate are zero, because then
-    nothing bounds them."""
+    """Return the gains of the largest decay rate (degree of stability). Raise ValueError if angle and rate are zero,
+    because then nothing bounds them."""
     optimum = _optimum(craft, spec)
     k = optimum.k_attitude
     return Gains(optimum.k_rate, (k, k, k), spec.compensation)
 
 
 def explain(craft: Craft, spec: Stability) -> list[tuple[str, Any]]:
-    """Return the scaled problem, its optimum, and its share of the best found by a search over all gains within the
+    """Return the scaled problem, its optimum, and the ratio of that to the best found by a search over all gains within the
     budget."""
     optimum = _optimum(craft, spec)
     budget = (spec.angle, spec.rate * optimum.t0, optimum.L)
@@ -80,7 +80,7 @@ def map_inputs(craft: Craft, spec: Stability) -> tuple[Any, float, float, float]
 
 
 def _optimum(craft: Craft, spec: Stability) -> Designed:
-    # Scalar gains act alike in any axes, so the principal ones serve.
+    # Scalar gains act alike in any axes, so principal axes suffice.
     moments = np.linalg.eigvalsh(tensor(craft.inertia))
     return design_gains(moments, spec.torque, spec.momentum, spec.angle, spec.rate)
 
@@ -91,7 +91,7 @@ def _twist(k: Vector, q: Vector) -> Vector:
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """Return the torque demanded of the wheels (N m, body)."""
+    """Return the torque demanded of the wheels (N m, body axes)."""
     q = vector_part(measurement.attitude)
     twist = _twist(gains.k_attitude, q)
     # S = 2 (q0 Mq + Mq x q), which for equal weights is 4 k q0 q.
@@ -104,10 +104,10 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
 
 
 def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
-    """Return V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|2 with full compensation.
+    """Return V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|^2 with full compensation.
 
-    At rest S = 0 also at half turns: about the three axes, or, where weights are equal, about any axis in their plane. V
-    decreases from each of them in some direction, so that they are unstable."""
+    At rest, S = 0 also at half turns about the three axes or, where weights are equal, about any axis in their plane. V
+    decreases from each of these in some direction, so they are unstable."""
     q = vector_part(measurement.attitude)
     return 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate)) + 2.0 * dot(q, _twist(gains.k_attitude, q))
 

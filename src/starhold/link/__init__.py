@@ -1,1 +1,1 @@
-"""A plant that flight software connects to: one protocol, over a network or over the pipes of a child process."""
+"""A plant to which flight software connects: one protocol, over a network, a serial line or pipes."""

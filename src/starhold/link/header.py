@@ -1,4 +1,4 @@
-"""The protocol as a header in C, for the readings of one loop."""
+"""The protocol as a C header, for the readings of one loop."""
 
 import re
 import textwrap
@@ -13,12 +13,12 @@ HEADER = "starhold_link.h"
 
 
 def place_name(field: str) -> str:
-    """Return the name in C of the place where a field begins."""
+    """Return the C name of the offset of a field."""
     return "STARHOLD_AT_" + re.sub(r"\W", "_", field).upper()
 
 
 def header(loop: ClosedLoop, scenario: str) -> str:
-    """Return the text of the header; scenario: what it is called."""
+    """Return the text of the header; scenario: its name."""
     layout = Layout(loop)
     places = [("time", 0, 1), *((one.name, 1 + one.first, one.size) for one in layout.fields)]
     kinds = [f"{kind.name.lower()}: {_about(kind)}" for kind in Kind]

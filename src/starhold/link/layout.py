@@ -23,9 +23,9 @@ class Field(NamedTuple):
 
 
 class Layout:
-    """The fields of the readings of a loop, after the time: what its own law is given (`measurement`), each sensor by its
-    name (`sensors`), the estimate (`estimate`), then the truth, which no flight software has in orbit: the body (`state`),
-    each effector by its name (`effectors`), and the target where it follows a table (`target`)."""
+    """The fields of the readings of a loop, after the time: the inputs of its own law (`measurement`), each sensor by its
+    name (`sensors`), the estimate (`estimate`), then the truth, which flight software does not have in orbit: the body
+    (`state`), each effector by its name (`effectors`), and a target that follows a table (`target`)."""
 
     def __init__(self, loop: ClosedLoop) -> None:
         carry, sensed = loop.carry(), sensed_of(loop)
@@ -47,28 +47,28 @@ class Layout:
 
     @property
     def size(self) -> int:
-        """How many numbers follow the time."""
+        """The number of numbers after the time."""
         return self.fields[-1].first + self.fields[-1].size if self.fields else 0
 
     @property
     def check(self) -> int:
-        """The CRC-32 of names and sizes, which both ends must have in common."""
+        """The CRC-32 of names and sizes, which must be equal at both ends."""
         return zlib.crc32("".join(f"{one.name} {one.size}\n" for one in self.fields).encode())
 
     def numbers(self, flight: Stepper, readings: Readings) -> NDArray[np.float64]:
-        """The time, and the numbers of all fields, at this instant of a flight whose readings these are."""
+        """Return the time and the numbers of all fields at this instant of a flight with these readings."""
         parts = [[readings.time], readings.numbers, flight.truth]
         if self._target is not None:
             parts.append(flatten(self._target.module.goal(flight.setup.target, flight.state, flight.steps, None)))
         return np.concatenate(parts)
 
     def place(self, name: str) -> Field:
-        """The field of a name. KeyError where there is none."""
+        """Return the field of a name. Raise KeyError if there is none."""
         return {one.name: one for one in self.fields}[name]
 
 
 def _named(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the fields of nested NamedTuples with dots between their names, but for those without numbers."""
+    """Yield the fields of nested NamedTuples with dotted names, except those without numbers."""
     if hasattr(value, "_fields"):
         for name, part in zip(cast(Any, value)._fields, value, strict=True):
             yield from _named(f"{prefix}.{name}", part)

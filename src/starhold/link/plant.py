@@ -1,4 +1,4 @@
-"""A flight that one peer commands by messages: bytes in, bytes out, without a network or a clock of its own."""
+"""A flight that one peer commands by messages: bytes in, bytes out, without network or clock."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from starhold.link.protocol import COMMANDS, STEPS, Decoder, Fault, Kind, Messag
 from starhold.simulation.stepper import Stepper
 
 KEPT = 1000
-"""Readings whose time of sending is remembered, for commands that come late."""
+"""Number of readings whose send times are remembered, for late commands."""
 
 
 class Missing(StrEnum):
-    """In real time, this flies a period for which no command came: the one before, none, or the flight ends."""
+    """The command in real time for a period without one: the previous command, zero, or the flight ends."""
 
     HOLD = "hold"
     ZERO = "zero"
@@ -28,7 +28,7 @@ class Missing(StrEnum):
 
 
 class Ending(StrEnum):
-    """A flight ends because of one of these."""
+    """The reasons for the end of a flight."""
 
     FLOWN = "flown to its end"
     STOPPED = "stopped by the flight software"
@@ -39,8 +39,8 @@ class Ending(StrEnum):
 
 
 class Rules(NamedTuple):
-    """steps: the control steps of the flight; rate: how many times faster than the clock it goes, None for lockstep, in
-    which the plant waits; missing: what flies a period without a command in real time."""
+    """steps: the control steps of the flight; rate: the ratio of simulated to real time, None for lockstep, in which the
+    plant waits; missing: the command in real time for a period without one."""
 
     steps: int
     rate: float | None = None
@@ -48,10 +48,10 @@ class Rules(NamedTuple):
 
 
 class Plant:
-    """A plant that its flight software commands.
+    """A plant commanded by flight software.
 
-    `received` takes the bytes that came; `send`, which the owner sets, takes those to be sent. In real time the owner calls
-    `tick` at the time `due` by `clock`. After the end, whose reason is `ending`, nothing moves."""
+    `received` takes received bytes; `send`, which the owner sets, takes bytes to send. In real time the owner calls `tick`
+    at the time `due` of `clock`. After the end, whose reason is `ending`, nothing moves."""
 
     def __init__(
         self, flight: Stepper, about: dict[str, Any], rules: Rules, clock: Callable[[], float] = time.perf_counter
@@ -62,7 +62,7 @@ class Plant:
         self.layout = Layout(flight.loop)
         fields = [[one.name, one.size] for one in self.layout.fields]
         self._about = json.dumps(about | {"steps": rules.steps, "fields": fields})
-        # No period waits for a compiler.
+        # So that no period waits for a compiler.
         flight.prepare()
         self._readings = flight.reset()
         self.send: Callable[[bytes], None] = lambda data: None
@@ -71,44 +71,44 @@ class Plant:
         self.greeted = False
         self.faults = Counter[str]()
         self.latencies: list[float] = []
-        """From readings that were sent to the command for their step (s)."""
+        """Times from sending readings to receiving the command for their step (s)."""
         self.missed = 0
-        """Periods of real time for which no command came in time."""
+        """Number of periods in real time without a command in time."""
         self.commanded = 0
         self.lateness: list[float] = []
-        """How late the plant itself has begun each period of real time (s)."""
+        """The plant's own delay at the start of each period in real time (s)."""
         self._sent: dict[int, float] = {}
         self._begin()
 
     @property
     def due(self) -> float | None:
-        """When the present period ends in real time, by `clock` (s); None in lockstep and before the first hello."""
+        """The end of the present period in real time, by `clock` (s); None in lockstep and before the first hello."""
         if self.rules.rate is None or self._begun is None or self.ending is not None:
             return None
         return self._begun + (self.flight.steps + 1) * self.flight.loop.period / self.rules.rate
 
     @property
     def behind(self) -> float:
-        """How late the plant itself has begun a period at most (s)."""
+        """The plant's own largest delay at the start of a period (s)."""
         return max(self.lateness, default=0.0)
 
     def received(self, data: bytes, decoder: Decoder) -> None:
-        """Heed the messages in these bytes of a stream, which has a decoder of its own, as far as they are valid."""
+        """Process the valid messages in these bytes of a stream, which has its own decoder."""
         for message in decoder.feed(data):
             self._heed(message, decoder)
 
     def datagram(self, data: bytes) -> None:
-        """Heed the messages in a datagram, which holds whole ones; a line of JSON may lack its end."""
+        """Process the messages in a datagram, which are complete; a line of JSON may lack its newline."""
         decoder = Decoder()
         self.received(data + b"\n" if data.startswith(b"{") else data, decoder)
         for fault in decoder.end():
             self._heed(fault, decoder)
 
     def tick(self) -> None:
-        """Fly the period that is over, with the command that came for it or by the rule for none."""
+        """Fly the period that is over, with the command received for it or by the rule for missing ones."""
         if self.due is None:
             return
-        # A timer may be early by less than its resolution.
+        # A timer may fire early by less than its resolution.
         self.lateness.append(max(0.0, self.clock() - self.due))
         command, self._next = self._next, None
         if command is None:
@@ -127,7 +127,7 @@ class Plant:
                 self._tell(Message(Kind.STOP, self.flight.steps, text=ending))
 
     def strange(self) -> None:
-        """Count a message of somebody else."""
+        """Count a message from another peer."""
         self.faults[Fault.STRANGER] += 1
 
     def _begin(self) -> None:
@@ -140,7 +140,7 @@ class Plant:
         if self.ending is not None:
             return
         if isinstance(message, Message) or not self.greeted:
-            # Answers have the form of the last valid message.
+            # Answers take the form of the last valid message.
             self._is_text = bool(decoder.is_text)
         if isinstance(message, Fault):
             self._refuse(message)
@@ -180,7 +180,7 @@ class Plant:
         elif message.step > wanted:
             self._refuse(Fault.ORDER)
         elif self.rules.rate is None and message.step == wanted - 1:
-            # Where the readings were lost, the command comes again until they arrive.
+            # If the readings were lost, the command is repeated until they arrive.
             self.faults[Fault.DOUBLED] += 1
             self._read_out()
         else:
@@ -193,7 +193,7 @@ class Plant:
 
     def _fly(self, command: Any) -> None:
         if self.flight.steps >= self.rules.steps:
-            # The last sample shows the command that comes after the end.
+            # The last sample contains the command that comes after the end.
             self.flight.close(command)
             self.end(Ending.FLOWN)
             return
@@ -218,7 +218,7 @@ class Plant:
 
 
 def status(plant: Plant) -> str:
-    """Summarise a flight in real time in one line: the current step, the latest latencies and the missed periods."""
+    """Return one line on a flight in real time: the current step, the latest latencies and the missed periods."""
     latest = plant.latencies[-KEPT:]
     latency = f"{1e3 * np.median(latest):.3g} ms, at most {1e3 * max(latest):.3g} ms" if latest else "none yet"
     late = f"plant late by {1e3 * plant.behind:.3g} ms"
@@ -226,7 +226,7 @@ def status(plant: Plant) -> str:
 
 
 def summary(plant: Plant) -> list[str]:
-    """Summarise a flight that ended, in lines: its last step, the latencies, and the messages that were rejected."""
+    """Return a summary of a finished flight: its last step, the latencies, and the rejected messages."""
     flight, rules = plant.flight, plant.rules
     unit = getattr(flight.loop.body.module, "TIME_UNIT", "s")
     reason = f"Ended at step {flight.steps} of {rules.steps} ({flight.time:g} {unit}): {plant.ending}."

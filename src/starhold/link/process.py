@@ -1,4 +1,4 @@
-"""A law that lives in a child process flies a loop: the protocol in its binary form, over the pipes of the child."""
+"""Flies a loop with a law in a child process: the binary protocol over the child's pipes."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from starhold.simulation.lane import Progress
 from starhold.simulation.stepper import Stepper
 
 PATIENCE = 60.0
-"""A process that says nothing for so long (s) is taken to hang."""
+"""A process that is silent for this time (s) is assumed to hang."""
 GRACE = 5.0
-"""A process has so long (s) to end by itself after the flight."""
+"""Time (s) in which a process may end by itself after the flight."""
 EVERY = 100
 """Control steps between two reports of progress."""
 
 
 class LostLawError(CutShortError):
-    """A law's process failed. flight: what was flown until then."""
+    """A law's process failed. flight: the flight until then."""
 
     def __init__(self, flight: Stepper, failure: str, allowed: str) -> None:
         super().__init__("run", "--law-process", failure, allowed)
@@ -37,10 +37,10 @@ class LostLawError(CutShortError):
 def fly_by_process(
     command: str, loop: ClosedLoop, steps: int, record_every: int = 1, progress: Progress | None = None
 ) -> tuple[NDArray[Any], Any]:
-    """The samples and the last carry of a loop, as `fly` gives them, whose commands come from a process.
+    """Return the samples and the final carry, like `fly`, of a loop whose commands come from a process.
 
-    command: the program and its arguments; no shell reads it. Lockstep; InputError where it cannot be started, LostLawError
-    where it ends before the flight does, hangs, or sends what is not valid."""
+    command: the program and its arguments, run without a shell, in lockstep. Raise InputError if it cannot be started,
+    LostLawError if it ends before the flight, hangs, or sends an invalid message."""
     flight = Stepper(loop)
     plant = Plant(flight, {}, Rules(steps))
     try:
@@ -59,7 +59,7 @@ def fly_by_process(
 
 
 def _converse(plant: Plant, child: subprocess.Popen[bytes], command: str, progress: Progress | None) -> None:
-    """Carry messages to and fro until the flight ends."""
+    """Exchange messages until the flight ends."""
     assert child.stdin is not None
     assert child.stdout is not None
     source, sink = child.stdout.fileno(), child.stdin.fileno()
@@ -81,7 +81,7 @@ def _converse(plant: Plant, child: subprocess.Popen[bytes], command: str, progre
         except BrokenPipeError:
             data = b""
         if plant.ending is not None:
-            # What is said after the end is not heeded; a process that has left needs no farewell.
+            # Messages after the end are ignored; a process that has exited needs no final message.
             if data == b"":
                 return
             continue

@@ -1,4 +1,4 @@
-"""The protocol between a plant and flight software: messages, in a binary form and as lines of JSON."""
+"""The protocol between a plant and flight software: messages in binary form and as lines of JSON."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from typing import Any, NamedTuple, cast
 
 MAGIC, VERSION = b"SHLK", 1
 HEAD, TAIL = struct.Struct("<4sBBHII"), struct.Struct("<I")
-"""Magic, version, kind, zero, bytes of the payload, step; and the CRC-32 of all before it."""
+"""Magic, version, kind, zero, payload length in bytes, step; and the CRC-32 of everything before it."""
 KEYS = {"kind", "version", "step", "numbers", "text", "about"}
 """Keys of a line of JSON."""
 LINE = 2**16
-"""Bytes that a line of JSON may have."""
+"""Most bytes in a line of JSON."""
 STEPS = 2**32
 COMMANDS = 3
-"""Numbers of a command."""
+"""Number of components of a command."""
 
 
 class Kind(IntEnum):
-    """A message is of one of these kinds, whose numbers stand in the binary form."""
+    """The kinds of messages, with their numbers in the binary form."""
 
     HELLO = 1
     READINGS = 2
@@ -34,8 +34,8 @@ class Kind(IntEnum):
 
 
 class Rule(NamedTuple):
-    """A kind of message: what it means from flight software and from the plant (empty where that does not send it), how many
-    numbers flight software may give, and what the numbers are."""
+    """A kind of message: its meaning from flight software and from the plant (empty if the plant does not send it), how
+    many numbers flight software may send, and what they are."""
 
     software: str
     plant: str
@@ -58,11 +58,11 @@ RULES = {
     Kind.STOP: Rule("ends the flight", "ends the flight; the text says why", (0,), "none"),
     Kind.REFUSED: Rule("", "rejects a message; the text says why", (), "none"),
 }
-"""Every kind of message."""
+"""The rule of every kind of message."""
 
 
 class Fault(StrEnum):
-    """A message that does not move the plant is one of these."""
+    """The faults for which a message is rejected."""
 
     MALFORMED = "malformed"
     VERSION = "of another version"
@@ -104,8 +104,8 @@ class Decoder:
     """Decodes messages from the bytes received, in pieces of any size. The first byte gives the form: `{` begins lines of
     JSON.
 
-    What is wrong comes out as a fault, after which the decoder continues with the next line, or the next complete frame.
-    by_plant: the messages are those of a plant, and else of flight software, whose numbers are checked."""
+    An invalid message yields a fault, after which the decoder continues with the next line, or the next complete frame.
+    by_plant: the messages come from a plant, else from flight software, whose numbers are checked."""
 
     def __init__(self, by_plant: bool = False) -> None:
         self.by_plant = by_plant
@@ -114,7 +114,7 @@ class Decoder:
         self._skipping = False
 
     def feed(self, data: bytes) -> Iterator[Message | Fault]:
-        """Yield the messages and faults that are complete with these bytes."""
+        """Yield the messages and faults completed by these bytes."""
         self._held += data
         if self.is_text is None and self._held:
             self.is_text = self._held.startswith(b"{")
@@ -144,7 +144,7 @@ class Decoder:
         while buffer:
             begin = buffer.find(MAGIC)
             if begin < 0:
-                # The beginning of a frame may still be cut.
+                # The beginning of a frame may still be incomplete.
                 begin = next(len(buffer) - n for n in range(len(MAGIC) - 1, -1, -1) if buffer.endswith(MAGIC[:n]))
             if begin > 0:
                 del buffer[:begin]
@@ -184,7 +184,7 @@ class Decoder:
 
 
 def _sizes(number: int) -> tuple[int, ...]:
-    """Return the bytes that the payload of a kind may have from flight software; none for what it does not send."""
+    """Return the allowed payload lengths of a kind of message from flight software; none if it does not send it."""
     rule = RULES.get(cast(Kind, number))
     return () if rule is None or not rule.software else tuple(8 * count for count in rule.counts)
 
@@ -227,7 +227,7 @@ def _of_line(text: bytes) -> Message | Fault:
 
 
 def _number(given: float | None) -> float:
-    """Return a number of JSON; what is too large for a double, or null, is not finite."""
+    """Return a number of JSON; null, and a number too large for a double, is not finite."""
     try:
         return math.nan if given is None else float(given)
     except OverflowError:

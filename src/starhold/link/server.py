@@ -1,4 +1,4 @@
-"""A plant that listens until its flight ends: what is common to all transports, and TCP and UDP."""
+"""A plant that listens until its flight ends: the common part of all transports, and TCP and UDP."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from starhold.link.protocol import Decoder
 
 HOST, PORT = "127.0.0.1", 5750
 UNREAD = 2**22
-"""Bytes that wait for a peer; one that leaves more unread is gone."""
+"""Most bytes waiting for a peer; one that leaves more unread is disconnected."""
 SECOND = 1.0
-"""The least time between two looks at a flight in real time (s)."""
+"""The least time between two calls of `watch` in real time (s)."""
 
 Listen: TypeAlias = Callable[["Line"], Coroutine[Any, Any, tuple[str, Callable[[], None]]]]
-"""A transport: it begins to listen for a line, and returns its address and a function that closes it."""
+"""A transport: it starts to listen for a line, and returns its address and a function that closes it."""
 
 
 def serve(
@@ -31,8 +31,9 @@ def serve(
 ) -> int:
     """Listen until the plant's flight ends, and return the number of the signal that ended it, 0 for none.
 
-    announce: called with the address, once it listens; watch: called with the plant in real time, at most once a second. The
-    first peer that says hello commands; messages of others are counted. InputError where the address cannot be used."""
+    announce: called with the address, once it listens; watch: called with the plant in real time, at most once per second.
+    The first peer that says hello commands; messages from others are counted. Raise InputError if the address cannot be
+    used."""
     return asyncio.run(_serve(plant, listen, announce, watch))
 
 
@@ -54,7 +55,7 @@ async def _serve(
 
 @contextlib.contextmanager
 def refused(keys: str, given: str, allowed: str = "an address of this machine, and a port that is free") -> Generator[None]:
-    """Report an address that cannot be listened on as an error of the user's input."""
+    """Inside this context, turn the error of an unusable address into an InputError."""
     try:
         yield
     except OSError as error:
@@ -70,7 +71,7 @@ async def tcp(line: Line, host: str, port: int) -> tuple[str, Callable[[], None]
 
 
 async def udp(line: Line, host: str, port: int) -> tuple[str, Callable[[], None]]:
-    """Listen on UDP, where each datagram holds whole messages."""
+    """Listen on UDP, where each datagram contains complete messages."""
     with refused("--host, --port", f"{host}:{port}"):
         transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(lambda: _Datagrams(line), (host, port))
     at = transport.get_extra_info("sockname")
@@ -79,7 +80,7 @@ async def udp(line: Line, host: str, port: int) -> tuple[str, Callable[[], None]
 
 @contextlib.contextmanager
 def _interrupts(end: Callable[[int], None]) -> Generator[None]:
-    """Let Ctrl-C and a request to end call a function; leave the handlers as they were."""
+    """Inside this context, Ctrl-C and SIGTERM call a function; the old handlers are restored at its end."""
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = {number: signal.getsignal(number) for number in numbers}
     loop = asyncio.get_running_loop()
@@ -110,11 +111,11 @@ class Line:
         self._timer: asyncio.TimerHandle | None = None
 
     def heed(self, peer: Any, send: Callable[[bytes], None], heed: Callable[[], None]) -> bool:
-        """Let the plant heed what a peer sent, unless another one commands: then it is counted, and the answer is False."""
+        """Let the plant process a peer's message. If another peer commands, count the message and return False."""
         if self.peer not in (None, peer):
             self.plant.strange()
             return False
-        # Until somebody has said hello, each is answered alone.
+        # Until a peer has said hello, each peer is answered separately.
         self.plant.send = send
         heed()
         self.peer = peer if self.plant.greeted else None
@@ -128,24 +129,24 @@ class Line:
         self.after()
 
     def gone(self) -> None:
-        """End the flight, for the peer that commands is gone."""
+        """End the flight because the commanding peer has disconnected."""
         self.plant.end(Ending.GONE)
         self.after()
 
     def failed(self, task: asyncio.Task[None]) -> None:
-        """Let an error in a task of a transport be that of the server."""
+        """Pass an error in a transport's task on to the server."""
         if not task.cancelled() and (error := task.exception()) is not None and not self.over.done():
             self.over.set_exception(error)
 
     def close(self) -> None:
-        """Leave all peers."""
+        """Close the connections to all peers."""
         if self._timer is not None:
             self._timer.cancel()
         for transport in self.transports:
             transport.close()
 
     def after(self) -> None:
-        """Set the clock, or leave, after something happened."""
+        """After an event, set the timer, or end the server if the flight has ended."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -166,7 +167,7 @@ class Line:
 
 
 class Stream(asyncio.Protocol):
-    """A connection, or a line without any; writer: where it is written to, if not where it is read from."""
+    """A connection, or a line without one; writer: the transport for writing, if it is not the one for reading."""
 
     def __init__(self, line: Line, writer: asyncio.WriteTransport | None = None) -> None:
         self._line, self._decoder, self._writer = line, Decoder(), writer
@@ -196,7 +197,7 @@ class Stream(asyncio.Protocol):
 
 
 class _Datagrams(asyncio.DatagramProtocol):
-    """Datagrams, of which each holds whole messages."""
+    """Datagrams, each with complete messages."""
 
     def __init__(self, line: Line) -> None:
         self._line = line

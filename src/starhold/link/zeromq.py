@@ -11,14 +11,14 @@ from starhold.link.protocol import LINE
 from starhold.link.server import Line, refused
 
 FAREWELL = 1000
-"""How long the last message may take to leave (ms)."""
+"""Time in which the last message may be sent (ms)."""
 
 
 async def zeromq(line: Line, host: str, port: int) -> tuple[str, Callable[[], None]]:
     """Listen with a ROUTER, to which flight software connects as DEALER or, in lockstep, as REQ.
 
-    Each message of ZeroMQ holds whole messages of the protocol, and the answers to it are one. InputError where the address
-    cannot be used, and without the extra `zmq`."""
+    Each ZeroMQ message contains complete messages of the protocol, and all answers to it form one message. Raise InputError
+    if the address cannot be used, or without the extra `zmq`."""
     zmq, sockets = optional("zmq", "serve --zmq", "zmq"), optional("zmq.asyncio", "serve --zmq", "zmq")
     from zmq.utils.monitor import parse_monitor_message
 

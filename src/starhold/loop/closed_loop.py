@@ -1,4 +1,4 @@
-"""A closed loop: a body, a law and the parts around them. This is the only place where a law meets a plant."""
+"""A closed loop: a body, a law and the parts around them. Only here are law and plant connected."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ ON_TARGET = Fitted(find("target", "inertial"), Inertial())
 
 
 class Setup(NamedTuple):
-    """The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. Those of parts are
-    in the order of the loop; limit: the saturation limit of the command; divergence_bound: the distance beyond which the
-    motion has diverged."""
+    """The numbers of a loop besides those of craft and law, an argument of kernels. Those of parts are in the order of the
+    loop; limit: the saturation limit of the command; divergence_bound: the distance beyond which the motion has
+    diverged."""
 
     period: float
     substep: float
@@ -43,9 +43,9 @@ class Setup(NamedTuple):
 
 
 class Composition(NamedTuple):
-    """The parts whose equations a loop is made of; one kernel flies all loops of equal compositions and numbers of one
-    form. watchers: the estimators that the law does not use; starters: for the law's estimator and each of them the place,
-    in this order, of the one that starts it, -1 for none; () where none is started."""
+    """The parts whose equations make up a loop; one kernel flies all loops of equal composition with numbers of the same
+    form. watchers: the estimators that the law does not use; starters: for the law's estimator and each of them the index,
+    in this order, of the one that starts it, -1 for none; () if none is started."""
 
     body: Part
     law: Law
@@ -62,9 +62,9 @@ class Composition(NamedTuple):
 
 
 class Memories(NamedTuple):
-    """The memories of parts from one control step to the next, in the order in which a loop has them; `followed` is the
-    target's attitude at the previous step, for a target that is continued from it; `readings` are those that are recorded,
-    and after them the estimates of watchers."""
+    """The memories of parts from one control step to the next, in the order of the loop; `followed` is the target's
+    attitude at the previous step, for a target that continues from it; `readings` are the recorded readings, followed by
+    the estimates of watchers."""
 
     followed: Any
     environments: tuple[Any, ...]
@@ -76,9 +76,9 @@ class Memories(NamedTuple):
 
 
 class Carry(NamedTuple):
-    """A trajectory carries this from step to step: the states of the body, of the effectors, and of actuators that
-    another one follows; the law's memory, those of other parts, the sign h = +-1 of the quaternion policy, the command,
-    and the control step at which the motion diverged (-1: none)."""
+    """The quantities that a trajectory carries from step to step: the states of the body, of the effectors, and of
+    actuators followed by another actuator; the memories of the law and the other parts, the sign h = +-1 of the quaternion
+    policy, the command, and the control step at which the motion diverged (-1: none)."""
 
     state: Any
     effectors: tuple[Any, ...]
@@ -91,8 +91,7 @@ class Carry(NamedTuple):
 
 
 class Event(NamedTuple):
-    """A change at a control step: the parts, gains and craft that fly from then on, and the law's nominal model of the
-    craft."""
+    """A change at a control step: the parts, gains and craft from then on, and the law's nominal model of the craft."""
 
     step: int
     parts: tuple[Fitted, ...]
@@ -102,7 +101,7 @@ class Event(NamedTuple):
 
 
 class Phase(NamedTuple):
-    """Control steps first .. last-1 of a run, and the numbers with which they are flown."""
+    """Control steps first .. last-1 of a run, and their numbers."""
 
     first: int
     last: int
@@ -111,7 +110,7 @@ class Phase(NamedTuple):
     craft: Any
     setup: Setup
     before: Any
-    """The craft before this phase."""
+    """The craft in the previous phase."""
 
     @property
     def jumps(self) -> bool:
@@ -120,7 +119,7 @@ class Phase(NamedTuple):
         return hasattr(self.craft, "inertia") and not all(np.array_equal(*pair) for pair in pairs)
 
     def rate_from(self, rate: Vector) -> Vector:
-        """The body's rate (rad/s) at the start of the phase, from that at the end of the previous one: a change of the
+        """Return the body's rate (rad/s) at the start of the phase from that at the end of the previous one: a change of
         inertia conserves the angular momentum."""
         pairs = zip(leaves(self.craft.inertia), leaves(self.before.inertia), strict=True)
         if all(np.array_equal(*pair) for pair in pairs):
@@ -128,7 +127,7 @@ class Phase(NamedTuple):
         return apply(self.craft.inverse_inertia, apply(self.before.inertia, rate))
 
     def entered(self, carry: Carry) -> Carry:
-        """The carry with which the phase begins."""
+        """Return the carry with which the phase begins."""
         return carry._replace(state=carry.state._replace(rate=self.rate_from(carry.state.rate))) if self.jumps else carry
 
 
@@ -148,15 +147,15 @@ class ClosedLoop:
     parts: tuple[Fitted, ...] = ()
     limit: Limit = "axis"
     command_limit: float | None = None
-    """The limit at which the command saturates (N m), per axis or in norm as `limit` says; None: the torque limit that the
-    law sees, the craft's. If effectors state the torque that they can always give, the law sees that torque; beyond it they
+    """The saturation limit of the command (N m), per axis or in norm as `limit` says; None: the craft's torque limit, which
+    the law knows. If effectors state the torque that they can always give, the law knows that one; beyond it they
     saturate."""
     sign_policy: SignPolicy = "as_published"
     hysteresis_width: float = 0.5
     divergence_bound: float = 1e3
     seed: int = 1
     run: int = 0
-    """The number of the run; with the seed it fixes the random numbers."""
+    """The number of the run, which together with the seed determines the random numbers."""
     events: tuple[Event, ...] = ()
     """Changes during a run, in order of time."""
     nominal: Any = None
@@ -169,12 +168,12 @@ class ClosedLoop:
 
     @property
     def body(self) -> Part:
-        """The part that moves: the body among the parts, else the installed one for which the law is made."""
+        """The body: the one among the parts, else the installed one for which the law is made."""
         bodies = self.used("body")
         return bodies[0].part if bodies else find("body", self.law.body)
 
     def used(self, role: str) -> tuple[Fitted, ...]:
-        """The parts of a role; of an estimator that the law does not use it is "watcher"."""
+        """Return the parts of a role; an estimator that the law does not use has the role "watcher"."""
         return tuple(fitted for fitted in self.parts if fitted.role == role)
 
     @property
@@ -183,11 +182,11 @@ class ClosedLoop:
         return (*self.used("estimator"), *self.used("watcher"))
 
     def find(self, name: str) -> Fitted | None:
-        """The first part of this name, as the part itself is called."""
+        """Return the first part whose file has this name."""
         return next((fitted for fitted in self.parts if fitted.part.name == name), None)
 
     def has(self, name: str) -> bool:
-        """Whether the loop has a part of this name."""
+        """Return whether the loop has a part of this name."""
         return self.find(name) is not None
 
     def with_parts(self, *more: Fitted) -> Self:
@@ -206,7 +205,7 @@ class ClosedLoop:
 
     @property
     def wheels(self) -> Any:
-        """The numbers of the reaction wheels in a claim, or None."""
+        """The reaction wheels as used in claims, or None."""
         fitted = self.find("wheels")
         return None if fitted is None else fitted.params
 
@@ -218,15 +217,15 @@ class ClosedLoop:
 
     @property
     def target(self) -> Fitted:
-        """The attitude that the body is to reach; the inertial axes by default."""
+        """The target; the inertial axes by default."""
         return next(iter(self.used("target")), ON_TARGET)
 
     def saturation_limit(self) -> float:
-        """The limit at which the command saturates; infinite without one."""
+        """Return the saturation limit of the command; infinite without one."""
         return getattr(self.craft, "torque_limit", np.inf) if self.command_limit is None else self.command_limit
 
     def as_commanded(self) -> Self:
-        """Return the loop without the estimators that neither the law uses nor its own starts with."""
+        """Return the loop without the estimators that are neither used by the law nor start its estimator."""
         there = {fitted.called: fitted for fitted in self.estimating}
         needed, now = list[str](), next(iter(self.used("estimator")), None)
         while now is not None:
@@ -235,7 +234,7 @@ class ClosedLoop:
         return self if kept == self.parts else replace(self, parts=kept)
 
     def composition(self) -> Composition:
-        """The parts whose equations this loop is made of."""
+        """The parts whose equations make up this loop."""
         estimator = next(iter(self.used("estimator")), None)
         roles = ("environment", "effector", "sensor", "actuator", "watcher")
         used = {role: tuple(f.part for f in self.used(role)) for role in roles}
@@ -263,7 +262,7 @@ class ClosedLoop:
 
     @property
     def fastest(self) -> Fitted | None:
-        """The part with the fastest dynamics of its own, which the integration must resolve."""
+        """The part with the fastest dynamics, which the integration must resolve."""
         every = (*self.parts, *(fitted for event in self.events for fitted in event.parts))
         return max((fitted for fitted in every if fitted.fastest > 0.0), key=lambda fitted: fitted.fastest, default=None)
 
@@ -294,9 +293,9 @@ class ClosedLoop:
         )
 
     def phases(self, steps: int) -> list[Phase]:
-        """The phases of a run of `steps` control steps, divided at the events."""
+        """Return the phases of a run of `steps` control steps, divided at the events."""
         events = (Event(0, self.parts, self.gains, self.craft, self.known), *self.events)
-        # Gains and crafts have one form in all phases, so that one kernel flies them all.
+        # Gains and crafts have the same form in all phases, so that one kernel serves them all.
         gains = alike([event.gains for event in events])
         crafts = alike([event.craft for event in events] + [event.nominal for event in events])
         lasts = [*(min(event.step, steps) for event in self.events), steps]
@@ -310,7 +309,7 @@ class ClosedLoop:
         return phases
 
     def carry(self, start: Any = None, gains: Any = None, nominal: Any = None, setup: Setup | None = None) -> Carry:
-        """The carry at the start of a trajectory: of the loop, or with another state of the body, gains, nominal model or
+        """Return the carry at the start of a trajectory, if given with another state of the body, gains, nominal model or
         setup."""
         start, setup = self.start if start is None else start, setup or self.setup()
         memory = self.law.remember(gains or self.gains, nominal or self.known, self.period)
@@ -335,34 +334,33 @@ class ClosedLoop:
         return Carry(start, effectors, (ZERO,) * (followed - 1), memory, memories, h, ZERO, -1.0)
 
     def first_attitude(self) -> Any:
-        """The attitude of a target that does not depend on the state, at the start."""
+        """Return the initial attitude of a target that does not depend on the state."""
         return self._goal(self.start, self.setup()).attitude
 
     def _goal(self, start: Any, setup: Setup) -> Goal:
-        """The goal at the start."""
+        """Return the goal at the start."""
         mode = (0.0,) if self.target.part.flag("BY_MODE") else ()
         return self.target.part.module.goal(setup.target, start, 0, self._followed((1.0, 0.0, 0.0, 0.0), setup), *mode)
 
     def _followed(self, attitude: Quaternion, setup: Setup) -> Any:
-        """The memory of the target at the start, from the attitude that it is continued from."""
+        """Return the initial memory of the target, which continues from this attitude."""
         first = self.target.part.hook("first")
         return attitude if first is None else first(setup.target, attitude)
 
 
 def is_recorded(sensor: Part) -> bool:
-    """Whether a sensor's readings are recorded."""
+    """Return whether a sensor's readings are recorded."""
     return getattr(sensor.module, "RECORDED", True)
 
 
 def can_be_inactive(effector: Part) -> bool:
-    """Return whether a mode can fly without this effector, because it takes the command or acts from outside."""
+    """Return whether a mode can fly without this effector, because it takes the command or its torque is external."""
     return effector.flag("ACTS") or effector.flag("OUTSIDE")
 
 
 def before_first(part: Part, state: Any, memory: Any = None) -> Any:
-    """The value of a sensor's reading or an estimator's estimate before the first one: the part's `FIRST`, else what the
-    estimator begins with, the fields of its memory of the same names, else those of the body's state. ValueError if there
-    is none of them."""
+    """Return a sensor's reading or an estimator's estimate before the first one: the part's `FIRST`, else the fields of the
+    same names in the estimator's initial memory, else in the body's state. Raise ValueError if there are none."""
     kind: Any = part.module.Estimate if part.role == "estimator" else part.module.Reading
     first = getattr(part.module, "FIRST", {})
     for name in kind._fields:

@@ -1,5 +1,5 @@
-"""The kernels that repeat the step of a closed loop over one lane or many: programs recorded from the equations of a
-step, compiled on first use.
+"""Kernels that repeat the step of a closed loop over one lane or many: programs recorded from the equations of a step and
+compiled on first use.
 
 One lane, any lane of a batch, plain Python, C and JavaScript agree bit for bit. No fast-math anywhere.
 """
@@ -26,8 +26,8 @@ Array: TypeAlias = NDArray[np.float64]
 
 
 class Numbers(NamedTuple):
-    """The arguments of a kernel: gains, the nominal model that the law has of the craft, the craft that flies, the
-    setup. Their numbers may be arrays (lanes,) where lanes differ. Whole numbers are constants of the kernel."""
+    """The arguments of a kernel: gains, the law's nominal model of the craft, the true craft, the setup. Numbers that
+    differ between lanes are arrays (lanes,). Integers are constants of the kernel."""
 
     gains: Any
     nominal: Any
@@ -36,14 +36,14 @@ class Numbers(NamedTuple):
 
     @classmethod
     def of(cls, phase: Phase) -> Numbers:
-        """The numbers of a phase."""
+        """Return the numbers of a phase."""
         return cls(phase.gains, phase.nominal, phase.craft, phase.setup)
 
 
 class Observer(NamedTuple):
-    """An observer takes notes of a flight at each control step: note(noted, decided, carry, step, setup, numbers) ->
-    noted. `decided` is the carry at the control instant `step`, with the command decided there, and `carry` that at its
-    end; `first` gives the shape of the notes, `numbers` are arguments of the kernel."""
+    """An observer takes notes (accumulated numbers) at each control step: note(noted, decided, carry, step, setup, numbers)
+    -> noted. `decided` is the carry at the control instant `step`, with the command decided there, and `carry` that at the
+    end of the step; `first` has the shape of the notes, `numbers` are arguments of the kernel."""
 
     note: Callable[..., Any]
     first: Any
@@ -52,13 +52,13 @@ class Observer(NamedTuple):
 
 @cache
 def make_step(parts: Composition, silent: bool = False) -> Step:
-    """The equations of a control step made of these parts; silent: without any noise."""
+    """Return the equations of a control step of these parts; silent: without any noise."""
     return make_equations(parts, Silent if silent else Dice)
 
 
 def form(value: Any) -> Any:
-    """A key that is equal for arguments that one kernel serves: their structure, their constants, and which of the
-    numbers that parts have in common are equal."""
+    """Return a key that is equal for arguments that one kernel serves: their structure, their constants, and which of the
+    numbers common to parts are equal."""
     return _form(value, {})
 
 
@@ -77,8 +77,7 @@ def _form(value: Any, known: dict[str, int]) -> Any:
 
 
 def _in_common(value: tuple[Any, ...]) -> str | None:
-    """Return a key that is equal for bitwise equal numbers that parts have in common; None for others, and where lanes
-    differ."""
+    """Return a key that is equal for bitwise equal numbers common to parts; None for others, and if lanes differ."""
     if not getattr(value, "IN_COMMON", False) or not all(isinstance(leaf, float) for leaf in leaves(value)):
         return None
     return repr(value)
@@ -96,7 +95,7 @@ def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
 
 
 class Arguments:
-    """Numbers as a kernel takes them: those that all lanes share, those that differ between lanes, and tables."""
+    """The numbers in a kernel's memories: those that all lanes share, those that differ between lanes, and tables."""
 
     def __init__(self, *values: Any) -> None:
         self.values = values
@@ -106,7 +105,7 @@ class Arguments:
         self.tables = np.array([x for table in buffers(values) for x in table.cells])
 
     def bound(self, recorder: Recorder, base: Any) -> Any:
-        """The values while recording; `base` is where a lane's own numbers begin."""
+        """Return the values while recording; a lane's own numbers begin at `base`."""
         shared, varying, tables = (recorder.memory(name, lanes=name == "own") for name in ("shared", "own", "tables"))
         places = {name: iter(range(1 << 40)) for name in ("shared", "own")}
         offset = 0
@@ -129,7 +128,7 @@ class Arguments:
                 return None if value is None else leaf(value)
             shared = _in_common(value)  # pyright: ignore
             if shared in met:
-                # A second part's computations with them are common subexpressions.
+                # So the computations of a second part with them are common subexpressions.
                 for _ in leaves(value):
                     next(places["shared"])
                 return met[shared]
@@ -141,17 +140,17 @@ class Arguments:
         return part(self.values)
 
     def rows(self, lanes: int) -> Array:
-        """The arguments that differ between lanes, as an array (arguments, lanes)."""
+        """Return the arguments that differ between lanes, as an array (arguments, lanes)."""
         return np.array([np.broadcast_to(row, (lanes,)) for row in self.varying]).reshape(len(self.varying), lanes)
 
 
 def numbers_of(state: Any) -> list[float]:
-    """A state's scalars in order, followed by the contents of its buffers."""
+    """Return a state's scalars in order, followed by the contents of its buffers."""
     return [*flatten(state), *(buffer[k] for buffer in buffers(state) for k in range(buffer.size))]
 
 
 def state_of(numbers: Any, like: Any) -> Any:
-    """The state shaped like `like` of the numbers that `numbers_of` gave."""
+    """Return the state shaped like `like` made of the numbers of `numbers_of`."""
     values = numbers.tolist()
     count = len(flatten(like))
     rest = iter(values[count:])
@@ -160,7 +159,7 @@ def state_of(numbers: Any, like: Any) -> Any:
 
 
 class Kernel:
-    """A compiled program. Called with its memories by name, then counts and words in the order the program states."""
+    """A compiled program, called with its memories by name, then counts and words in the program's order."""
 
     def __init__(self, program: Program, width: int, passes: bool | None = None) -> None:
         """passes: see `load`."""
@@ -171,7 +170,7 @@ class Kernel:
         self.on(memories)(*map(word, counts))
 
     def on(self, memories: dict[str, Array]) -> Callable[..., None]:
-        """The program on memories that stay where they are, which is called with counts and words alone."""
+        """Return the program bound to these memories, which must not move; it is called with counts and words alone."""
         return partial(self._call, *(memories[memory.name].ctypes.data for memory in self.program.memories))
 
 
@@ -180,7 +179,7 @@ _KERNELS: dict[Any, Kernel] = {}
 
 
 def make_program(kind: Callable[..., Program], parts: Composition, *arguments: Any) -> Program:
-    """The program kind(step, *arguments), recorded once; one serves all arguments of the same form."""
+    """Return the program kind(step, *arguments), recorded once for all arguments of the same form."""
     key = (kind, parts, form(arguments))
     if key not in _PROGRAMS:
         _PROGRAMS[key] = kind(make_step(parts), *arguments)
@@ -190,7 +189,8 @@ def make_program(kind: Callable[..., Program], parts: Composition, *arguments: A
 def make_kernel(
     kind: Callable[..., Program], parts: Composition, width: int, *arguments: Any, passes: bool | None = None
 ) -> Kernel:
-    """The kernel of a program kind(step, *arguments); one serves all arguments of the same form. passes: see `load`."""
+    """Return the kernel of a program kind(step, *arguments), compiled once for arguments of one form. passes: see
+    `load`."""
     key = (kind, parts, width, passes, form(arguments))
     if key not in _KERNELS:
         _KERNELS[key] = Kernel(make_program(kind, parts, *arguments), width, passes)

@@ -1,4 +1,4 @@
-"""Each mode of a law may have a target of its own in the loop, and its law can be flown by itself."""
+"""Targets and effectors of the modes of a law: each mode may have its own target, and its law can fly alone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from starhold.parts.roles import Goal
 
 @dataclass(frozen=True)
 class ModeTargets:
-    """Takes the place of a target's module, for the present mode's target; `goal` takes the mode, counted from 0."""
+    """Replaces a target's module by the target of the present mode; `goal` takes the mode, counted from 0."""
 
     parts: tuple[Part, ...]
     ROLE = "target"
@@ -29,7 +29,7 @@ class ModeTargets:
 
     @property
     def CARD(self) -> Card:  # noqa: N802
-        """The targets of all modes."""
+        """The card of the targets of all modes."""
         names = ", ".join(part.name for part in self.parts)
         return Card("Targets of modes", names, ("definition",), ())
 
@@ -38,7 +38,7 @@ class ModeTargets:
         return tuple(dict.fromkeys(need for target in self._fitted(params) for need in target.needs))
 
     def about(self, params: tuple[Any, ...]) -> str:
-        """Return the one body that their orbit may be about, where one of them says so."""
+        """Return the only body that they may orbit, if one of them names it."""
         return next((target.about for target in self._fitted(params) if target.about), "")
 
     def _fitted(self, params: tuple[Any, ...]) -> list[Fitted]:
@@ -46,20 +46,20 @@ class ModeTargets:
 
     @property
     def STILL(self) -> bool:  # noqa: N802
-        """Whether none of them turns."""
+        """Whether none of them turns during a flight."""
         return all(part.flag("STILL") for part in self.parts)
 
     @property
     def FOLLOWS(self) -> bool:  # noqa: N802
-        """Whether one of them is continued from the attitude before."""
+        """Whether one of them continues from its previous attitude."""
         return any(part.flag("FOLLOWS") for part in self.parts)
 
     def prepare(self, params: tuple[Any, ...], period: float) -> tuple[Any, ...]:
-        """Their parameters as equations take them."""
+        """Return their parameters in the form that equations take."""
         return tuple(target.prepared(period) for target in self._fitted(params))
 
     def check(self, params: tuple[Any, ...], craft: Any) -> None:
-        """ValueError where one of them does not fit a craft."""
+        """Raise ValueError if one of them does not fit a craft."""
         for part, numbers in zip(self.parts, params, strict=True):
             examine = part.hook("check")
             if examine is not None:
@@ -71,8 +71,7 @@ class ModeTargets:
         return any(isinstance(part.module, Slewing) for part in self.parts)
 
     def first(self, params: tuple[Any, ...], attitude: Any) -> Any:
-        """The memory of them at the start: the attitude that they are continued from, with the path of a slew if there is
-        one."""
+        """Return their initial memory: the attitude from which they continue, with the path of a slew if there is one."""
         if not self.SLEWS:
             return attitude
         slews = [numbers.slew for part, numbers in zip(self.parts, params, strict=True) if isinstance(part.module, Slewing)]
@@ -81,7 +80,7 @@ class ModeTargets:
     def begun(
         self, params: tuple[Any, ...], state: Any, attitude: Any, step: Any, craft: Any, before: Followed, memory: Any
     ) -> Followed:
-        """The memory of them as a control step of the present mode begins, at an attitude."""
+        """Return their memory at the start of a control step of the present mode, at an attitude."""
         first = less(memory.age, 0.5)
         for place, (part, numbers) in enumerate(zip(self.parts, params, strict=True)):
             module: Any = part.module
@@ -94,7 +93,7 @@ class ModeTargets:
         return before
 
     def goal(self, params: tuple[Any, ...], state: Any, step: Any, before: Any, mode: Any) -> Goal:
-        """The goal of the present mode."""
+        """Return the goal of the present mode."""
         attitude = before.attitude if self.SLEWS else before
         goals = [
             part.module.goal(numbers, state, step, before if isinstance(part.module, Slewing) else attitude)
@@ -111,17 +110,17 @@ def _is(mode: Any, place: int) -> Truth:
 
 
 def join_targets(targets: Sequence[Fitted], slews: Sequence[Slew | None]) -> Fitted:
-    """The target of a loop whose modes have these, one each, some of them reached by slews."""
+    """Return the target of a loop whose modes have these targets, one each, some of them reached by slews."""
     targets = [slewing(target, slew) for target, slew in zip(targets, slews, strict=True)]
     module: Any = ModeTargets(tuple(target.part for target in targets))
-    # A target from a file is checked like all parts from files.
+    # A target from a file is checked, like all parts from files.
     file = next((target.part.file for target in targets if target.part.file is not None), None)
     return Fitted(Part("targets-of-modes", module, file), tuple(target.params for target in targets))
 
 
 @dataclass(frozen=True)
 class Inactive:
-    """Takes the place of the module of an effector that is inactive in a mode: its command is zero."""
+    """Replaces the module of an effector that is inactive in a mode: its command is zero."""
 
     module: Any
 
@@ -137,8 +136,8 @@ class Inactive:
 
 
 def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
-    """The loop of the law of one mode, counted from 0, as if it flew alone towards its target with the effectors that are
-    active in it."""
+    """Return the loop of the law of one mode, counted from 0, as if it flew alone with its target and the effectors active
+    in it."""
     _, law, gains = mode_laws(loop.law, loop.gains)[place]
     alone, target = replace(loop, law=law, gains=gains, events=()), loop.target
     if target.part.flag("BY_MODE"):

@@ -1,5 +1,5 @@
-"""The programs that repeat the step of a closed loop, recorded: over one lane or many, a step at a time, over samples, and
-over the calls of a law."""
+"""Recorded programs that repeat the step of a closed loop: over one lane or many, a step at a time, over samples, and over
+the calls of a law."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from starhold.trace.sharing import differing, split
 
 _HALVES: dict[Any, tuple[tuple[Kernel, Kernel], tuple[int, ...]]] = {}
 CHUNK = 1024
-"""Control steps for which the numbers that all lanes share are made at once, before lanes fly them."""
+"""Control steps for which the numbers common to all lanes are computed at once, before the lanes fly them."""
 
 
 def _state(like: Any, cells: Cells, base: Any, known: dict[int, Any] | None = None) -> Any:
-    """The state that lies in memory from `base` on, as `numbers_of` orders it; known: its numbers that lie elsewhere, by
-    place."""
+    """Return the state stored in memory from `base` on, in the order of `numbers_of`; known: numbers stored elsewhere, by
+    index."""
     place, start = 0, len(flatten(like))
 
     def leaf(value: Any) -> Any:
@@ -47,10 +47,10 @@ def _put(cells: Cells, base: Any, state: Any) -> None:
 
 
 def one(step: Step, carry: Any, numbers: Numbers, substeps: int, by_rows: bool = False) -> Program:
-    """The flight of one lane, or of a vector of lanes that draw the same random numbers, recorded: `groups` times
-    `each` control steps from `first` on, with a sample of the step number `place` of every group, written from the row
-    `row` on. A lane stops when its motion diverges; its last carry stays in `carry`. by_rows: of one lane, with
-    `each` of several rows at once."""
+    """Record the flight of one lane, or of a vector of lanes that draw the same random numbers: `groups` times `each`
+    control steps from `first` on, with a sample of step `place` of every group, written from row `row` on. A lane stops
+    when its motion diverges; its last carry stays in `carry`. by_rows: for one lane, `each` of `algebra.several` is
+    recorded over several rows at once."""
     recorder = RowRecorder() if by_rows else Recorder()
     with recorder.recording():
         cells = recorder.memory("carry", lanes=True, writable=True)
@@ -92,9 +92,9 @@ def many(
     runs: Any = (),
     alike: tuple[int, ...] = (),
 ) -> Program:
-    """The flight of many lanes, recorded: control steps first .. first+count-1 of every lane of `blocks` blocks of lanes, in
-    place. Lane 0 is run number `run` and the others follow, or each lane has its own of `runs`. The observer's notes lie
-    in `noted`. alike: places of numbers of the carry that are equal in all lanes; they lie in `common`, in this order."""
+    """Record the flight of many lanes: control steps first .. first+count-1 of every lane of `blocks` blocks of lanes, in
+    place. Lane 0 is run number `run` and the others follow, or `runs` has each lane's number. The observer's notes are in
+    `noted`. alike: indices of numbers of the carry that are equal in all lanes; they are in `common`, in this order."""
     recorder = LanesRecorder()
     with recorder.recording():
         cells = recorder.memory("carry", lanes=True, writable=True)
@@ -130,8 +130,8 @@ def many(
 
 
 class Given(NamedTuple):
-    """A row gives this from outside at a control instant: the readings of each sensor and, where they are finite, numbers of
-    the body's state, of the effectors' states and of the command that acts."""
+    """A row of external data at a control instant: the readings of each sensor and, where they are finite, numbers of the
+    body's state, of the effectors' states and of the acting command."""
 
     readings: Any
     state: Any
@@ -140,9 +140,9 @@ class Given(NamedTuple):
 
 
 def replaying(step: Step, carry: Any, numbers: Numbers, substeps: int, like: Given) -> Program:
-    """`count` control steps of one lane from `first` on, recorded: what the estimator and the law make of readings from
-    outside. `given` has a row shaped as `like` for each, `record` gets the step's sample with the law's own command. Numbers
-    of the state that are not given are those that are estimated or read, else those of the motion."""
+    """Record `count` control steps of one lane from `first` on, in which estimator and law process external readings.
+    `given` has a row shaped as `like` for each step, `record` gets the step's sample with the law's own command. Numbers of
+    the state that are not given are the estimated or measured ones, else those of the simulated motion."""
     recorder = Recorder()
     with recorder.recording():
         cells, record = (recorder.memory(name, lanes=True, writable=True) for name in ("carry", "record"))
@@ -171,15 +171,15 @@ def replaying(step: Step, carry: Any, numbers: Numbers, substeps: int, like: Giv
 
 
 def _finite(given: Any, other: Any) -> Any:
-    """Take the numbers that are given, where they are finite, else others of the same structure."""
+    """Return the given numbers where they are finite, else the others, in the same structure."""
     source = iter(flatten(given))
     return mapped(other, lambda leaf: where(is_finite(number := next(source)), number, leaf))
 
 
 def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: bool) -> Program:
-    """One control step, or none if `count` is 0, of each lane of `blocks` blocks of lanes, recorded. The law decides or, if
-    `outside`, the command lies in `given`. What the law is told at the end lies in `sensed`, the step's sample in `record`.
-    Lane 0 is run number `run` and the others follow."""
+    """Record one control step, or none if `count` is 0, of each lane of `blocks` blocks of lanes. The law decides the
+    command or, if `outside`, it is in `given`. The law's inputs at the end of the step are in `sensed`, the step's sample
+    in `record`. Lane 0 is run number `run` and the others follow."""
     recorder = Recorder()
     with recorder.recording():
         cells, record, sensed = (recorder.memory(name, lanes=True, writable=True) for name in ("carry", "record", "sensed"))
@@ -210,9 +210,9 @@ def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: b
 def predicting(
     step: Step, sensors: Sequence[Part], made: Callable[..., tuple[Any, Numbers]], free: int, substeps: int, outside: bool
 ) -> tuple[Program, Program, Arguments]:
-    """The flight that so many free numbers predict, recorded: the program that makes its carry of them, which `made`
-    gives with the kernel's numbers, and one of `count` control steps from `first` on. All readings lie in `record` and, if
-    `outside`, all commands in `given`; then the law's memory stays. step: see `silent` of `make_step`."""
+    """Record the flight predicted by `free` free numbers: the program that computes the carry from them, which `made`
+    returns with the kernel's numbers, and one of `count` control steps from `first` on. All readings are in `record` and,
+    if `outside`, all commands in `given`; then the law's memory does not change. step: see `silent` of `make_step`."""
     recorder = Recorder()
     with recorder.recording():
         cells, numbers = recorder.memory("carry", lanes=True, writable=True), recorder.memory("free", lanes=True)
@@ -246,8 +246,8 @@ def _put_row(cells: Cells, row: Any, values: Any) -> None:
 
 
 def steady(step: Step, alike: tuple[int, ...], *arguments: Any) -> tuple[Program, tuple[int, ...]]:
-    """The program many(step, *arguments) with what is left of `alike`, and that: the places at which the carry is equal in
-    all lanes before the flight and after it."""
+    """Return the program many(step, *arguments) with `alike` reduced to the indices at which the carry is equal in all
+    lanes both before the flight and after it, and those indices."""
     while True:
         program = many(step, *arguments, alike=alike)
         names, (block,) = differing(program), [s for s in program.main.body if isinstance(s, Loop)]
@@ -261,8 +261,8 @@ def steady(step: Step, alike: tuple[int, ...], *arguments: Any) -> tuple[Program
 def make_halves(
     parts: Composition, width: int, alike: tuple[int, ...], *arguments: Any
 ) -> tuple[tuple[Kernel, Kernel], tuple[int, ...]]:
-    """The kernels of `steady`: that of what all lanes share, and that of what is a lane's own; and what is left of `alike`.
-    They are called one after the other for at most `CHUNK` control steps."""
+    """Return the kernels of `steady`, one for the values common to all lanes and one for a lane's own, and the reduced
+    `alike`. They are called one after the other for at most `CHUNK` control steps."""
     key = (parts, width, form(arguments))
     if (*key, alike) not in _HALVES:
         program, stay = steady(make_step(parts), alike, *arguments)
@@ -274,7 +274,7 @@ def make_halves(
 
 
 def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:
-    """The carry after the substeps of a control step."""
+    """Return the carry after the substeps of a control step."""
     if substeps == 1:
         return step.propagate(carry, craft, setup)
     return repeat(substeps, lambda _, carry: (step.propagate(carry, craft, setup),), carry)[0]
@@ -283,10 +283,10 @@ def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -
 def over_samples(
     note: Callable[..., Any], first: Any, numbers: tuple[Any, Any], columns: tuple[tuple[str, tuple[int, ...]], ...]
 ) -> Program:
-    """The program that takes notes of `count` samples in `record`, from the instant `first` on, and keeps them in `noted`.
+    """Record the program that takes notes of `count` samples in `record`, from the instant `first` on, in `noted`.
 
-    note(noted, quantities, instant, limit, numbers) -> noted; first: the shape of the notes; numbers: those of the
-    notes, and the limit; columns: the recorded quantities with their shapes, () or (components,), in order."""
+    note(noted, quantities, instant, limit, numbers) -> noted; first: the shape of the notes; numbers: arguments of `note`,
+    and the limit; columns: the recorded quantities with their shapes, () or (components,), in order."""
     recorder = Recorder()
     with recorder.recording():
         record, noted = recorder.memory("record"), recorder.memory("noted", writable=True)
@@ -306,7 +306,7 @@ def over_samples(
 
 
 def replay(step: Step, carry: Any, numbers: Numbers) -> Program:
-    """The control calls of a run, recorded for timing: updates on the states first .. first+count-1, one after another."""
+    """Record the control calls of a run for timing: updates on the states first .. first+count-1, one after another."""
     recorder = Recorder()
     with recorder.recording():
         cells, states = recorder.memory("carry", lanes=True, writable=True), recorder.memory("states")
@@ -317,7 +317,7 @@ def replay(step: Step, carry: Any, numbers: Numbers) -> Program:
         begun, width = _state(carry, cells, 0), len(flatten(like))
 
         def turn(k: Any, carry: Any) -> Any:
-            # Each call waits for the torque of the call before.
+            # Each call waits for the torque of the previous call.
             u = carry.command
             wait = 0.0 * (u[0] + u[1] + u[2])
             state, effectors = _state(like, states, (first + k) * width)

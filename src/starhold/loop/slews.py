@@ -1,5 +1,5 @@
-"""Slews of modes: as a mode begins, its target is reached on a path of `parts.targets.eigenaxis` from the attitude that the
-craft then has."""
+"""Slews at the start of modes: a mode's target is reached on a path of `parts.targets.eigenaxis` from the present
+attitude."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ RESTING = Leg((1.0, 0.0, 0.0), 0.0, 0.0, 0.0)
 
 
 class Slew(NamedTuple):
-    """The largest rate (rad/s), acceleration (rad/s2) and torque about each body axis (N m) of a slew, the cone that it
-    keeps out of, and the Sun at the start (each () for none)."""
+    """The largest rate (rad/s), acceleration (rad/s2) and torque about each body axis (N m) of a slew, its keep-out cone,
+    and the Sun at the start (each () for none)."""
 
     rate: Scalar
     acceleration: Scalar
@@ -31,7 +31,7 @@ class Slew(NamedTuple):
 
 class Followed(NamedTuple):
     """The target's attitude at the previous step, the control step at which the present mode began, the attitude then,
-    relative to the mode's target, and the turns from there."""
+    relative to the mode's target, and the turns of the path."""
 
     attitude: Quaternion
     begin: Scalar
@@ -40,7 +40,7 @@ class Followed(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """The numbers of a target that is reached by a slew, and the control period (s)."""
+    """The numbers of a target reached by a slew, and the control period (s)."""
 
     target: Any
     slew: Slew
@@ -49,7 +49,7 @@ class Reached(NamedTuple):
 
 @dataclass(frozen=True)
 class Slewing:
-    """Takes the place of the module of a target that is reached by a slew."""
+    """Replaces the module of a target reached by a slew."""
 
     part: Part
     ROLE = "target"
@@ -62,31 +62,31 @@ class Slewing:
         return getattr(self.part.module, name)
 
     def needs(self, params: tuple[Any, Slew]) -> tuple[str, ...]:
-        """Return what the target itself needs."""
+        """Return the parts that the target itself needs."""
         return Fitted(self.part, params[0]).needs
 
     def about(self, params: tuple[Any, Slew]) -> str:
-        """Return the one body that the orbit of the target itself may be about."""
+        """Return the only body that the target itself may orbit."""
         return Fitted(self.part, params[0]).about
 
     def prepare(self, params: tuple[Any, Slew], period: float) -> Reached:
-        """The numbers of the target and of the slew as equations take them."""
+        """Return the numbers of the target and of the slew in the form that equations take."""
         return Reached(Fitted(self.part, params[0]).prepared(period), params[1], period)
 
     def check(self, params: Reached, craft: Any) -> None:
-        """ValueError where the target itself does not fit a craft."""
+        """Raise ValueError if the target itself does not fit a craft."""
         examine = self.part.hook("check")
         if examine is not None:
             examine(params.target, craft)
 
     def goal(self, params: Reached, state: Any, step: Any, before: Followed) -> Goal:
-        """The attitude at this control step of the path onto the target."""
+        """Return the goal at this control step on the path to the target."""
         reached = self.part.module.goal(params.target, state, step, before.attitude)
         path = turned(before.start, before.legs, (number_of(step) - before.begin) * params.period)
         return onto(reached, path, before.attitude)
 
     def begun(self, params: Reached, state: Any, attitude: Quaternion, step: Any, craft: Any, before: Followed) -> Followed:
-        """The path that begins at this control step, from an attitude."""
+        """Return the memory with the path that begins at this control step from an attitude."""
         goal, slew = self.part.module.goal(params.target, state, step, before.attitude), params.slew
         start, seen = relative(goal.attitude, attitude), _sun(goal, step, params)
         turns, _ = turns_of(start, NO_TURN, slew.cone, seen)
@@ -96,7 +96,7 @@ class Slewing:
 
 
 def _sun(goal: Goal, step: Any, params: Reached) -> Vector:
-    """The direction of the Sun in the target's axes, where a cone needs it."""
+    """Return the direction of the Sun in the target's axes, if a cone needs it."""
     if not params.slew.cone:
         return (0.0, 0.0, 0.0)
     seen = sun.sun(number_of(step) * params.period, params.slew.sun)  # pyright: ignore[reportArgumentType]
@@ -104,7 +104,7 @@ def _sun(goal: Goal, step: Any, params: Reached) -> Vector:
 
 
 def slewing(target: Fitted, slew: Slew | None) -> Fitted:
-    """The target as it is reached by a slew, None for none."""
+    """Return the target reached by a slew, or the target itself if `slew` is None."""
     if slew is None:
         return target
     module: Any = Slewing(target.part)
@@ -112,6 +112,6 @@ def slewing(target: Fitted, slew: Slew | None) -> Fitted:
 
 
 def reached(target: Fitted) -> Fitted:
-    """The target itself of one that is reached by a slew."""
+    """Return the target itself, without its slew."""
     module: Any = target.part.module
     return Fitted(module.part, target.params[0]) if isinstance(module, Slewing) else target

@@ -1,5 +1,5 @@
-"""The equations of one control step, which all interpreters share: `measure` (the law's measurement), `update` (its command
-at a control instant) and `propagate` (the motion under the held command), composed of the equations of a loop's parts."""
+"""The equations of one control step, composed of those of a loop's parts and shared by all interpreters: `measure` (the
+law's measurement), `update` (its command at a control instant) and `propagate` (the motion under the held command)."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from starhold.parts.roles import Loads, Scene
 
 
 class Step(NamedTuple):
-    """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied,
-    `sense` what the law is given at a control instant, of readings from outside if there are any; `update` decides by it or
-    takes a command from outside; `slope` is the rates of (state, effectors, outputs of actuators that another one follows),
-    which `propagate` integrates."""
+    """The equations of one control step. `measure` returns the law's measurement before the quaternion sign policy, `sense`
+    the inputs of the law at a control instant, from external readings if there are any; `update` decides the command from
+    them or takes an external one; `slope` returns the rates of (state, effectors, outputs of actuators followed by
+    another), which `propagate` integrates."""
 
     measure: Callable[..., Any]
     sense: Callable[..., Sensed]
@@ -39,8 +39,8 @@ class Step(NamedTuple):
 
 
 class Sensed(NamedTuple):
-    """The inputs of a law at a control instant: its measurement, the readings of the sensors and the estimate; and what the
-    step needs afterwards: the carry, the memories and the sign of the quaternion."""
+    """The inputs of a law at a control instant (its measurement, the readings of the sensors and the estimate), and the
+    inputs of the rest of the step (the carry, the memories and the sign of the quaternion)."""
 
     measurement: Any
     readings: Any
@@ -51,7 +51,7 @@ class Sensed(NamedTuple):
 
 
 def total(vectors: Any) -> Any:
-    """The sum of vectors from the first to the last, of which some may be None; None without any."""
+    """Return the sum of vectors from the first to the last, some of which may be None; None without any."""
     result = None
     for vector in vectors:
         if vector is not None:
@@ -60,7 +60,7 @@ def total(vectors: Any) -> Any:
 
 
 def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step:
-    """Compose the equations of a control step of these parts; dice: what makes their random numbers, as `Dice` does."""
+    """Return the equations of a control step of these parts; dice: the source of their random numbers, such as `Dice`."""
     body, target = parts.body.module, parts.target
     limit = LIMITS[parts.limit]
     policy = getattr(body, "SIGN_POLICIES", {}).get(parts.sign_policy)
@@ -69,7 +69,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
     follows = target is not None and target.flag("FOLLOWS")
     by_mode = target is not None and target.flag("BY_MODE")
     slews = target is not None and target.flag("SLEWS")
-    # Such a law of modes looks at more than its measurement to decide which one commands.
+    # Such a law of modes needs more than its measurement to decide which mode commands.
     watches = named.modes is not None and named.modes.WATCHES
     asked_for = {name for part in (parts.law, *parts.effectors) for name in part.reads}
     command_of = parts.law.module.command if by_mode or watches else parts.law.command
@@ -81,7 +81,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         return target.module.goal(setup.target, state, step, carry.memories.followed, *mode)
 
     def observed(carry, step, key, craft, setup, seen=None):
-        """Return a function that gives the law's measurement towards a goal and the memories of sensors and estimator, the
+        """Return a function that returns the law's measurement for a goal and the memories of sensors and estimator, the
         goal, and the readings of the sensors."""
         state, memories = carry.state, carry.memories
         goal = goal_of(carry, state, step, setup)
@@ -90,7 +90,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
             reading, memory = sensor.module.measure(state, memory, params, dice(key, word_of(step), first), step)
             reading = reading if seen is None else seen[len(every)]
-            # Of several readings of a name all that do not ask for more are given the first.
+            # Parts that do not ask for several readings of a name get the first.
             vars(readings).update(reading._asdict() | vars(readings))
             kept.append(memory)
             every.append(reading)
@@ -112,7 +112,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
             one.part.module.torque(known, setup.environments[one.place], craft, memories.environments[one.place])
             for one in telling
         )
-        # Effectors that take the command know their speeds; others have no sensor.
+        # Effectors that take the command measure their speeds; others have no sensor.
         turning = zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
         momentum = total(_measured(e)(inner, params) for e, inner, params in turning if e.flag("ACTS"))
 
@@ -140,7 +140,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         return show, goal, Sight(known, tuple(every), estimate)
 
     def estimated(values, every, memories, craft, setup):
-        """The estimates, and memories, of the law's estimator and of those that watch."""
+        """Return the estimates and memories of the law's estimator and of those that watch."""
         used = parts.estimator is not None
         before = (*([memories.estimator] if used else []), *memories.watchers)
         numbers = (*([setup.estimator] if used else []), *setup.watchers)
@@ -165,7 +165,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
             watched = (sight,) if watches else ()
             carry = carry._replace(memory=parts.law.module.decide(measurement, gains, carry.memory, *watched))
         if by_mode:
-            # The measurement of the law of a mode that begins is relative to the mode's own target.
+            # The law of a mode that begins gets a measurement relative to the mode's own target.
             before = carry.memories.followed
             if target is not None and slews:
                 attitude = sight.state.attitude
@@ -201,8 +201,8 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         return Carry(state, effectors, carry.actuators, memory, memories, h, passed, carry.lost_at)
 
     def switched(effector, inner, wanted, measurement, state, params, step, memory):
-        """The state of an effector as a control step begins. For one that is inactive in the present mode it is the
-        state for a zero command or, if the effector takes no command, its initial state."""
+        """Return the state of an effector at the start of a control step. If it is inactive in the present mode, this is
+        the state for a zero command or, if it takes no command, its initial state."""
         inactive = named.inactive(effector, memory)
         switch = effector.module.switch
         if inactive is None:
@@ -212,7 +212,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         return chosen(inactive, effector.module.remember(params), switch(inner, wanted, measurement, state, params, step))
 
     def outside(kind, state, craft, memories, setup):
-        """The sum of the environments' torques or accelerations."""
+        """Return the sum of the environments' torques or accelerations."""
         sources = named.torques if kind == "torque" else named.accelerations
         return total(
             getattr(one.part.module, kind)(state, setup.environments[one.place], craft, memories.environments[one.place])
@@ -259,8 +259,8 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
                 yield ()
 
     def _driven(outputs, applied, carry, begun, setup):
-        """d(output)/dt of the actuators with dynamics: of all but the last, and of the last, whose output acts on the
-        body."""
+        """Return d(output)/dt of the actuators with dynamics: of all except the last, and of the last, whose output acts on
+        the body."""
         if not named.dynamic:
             return (), None
         inputs, values = (carry.command, *outputs), (*outputs, applied)
@@ -276,9 +276,9 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
     advance = runge_kutta(slope)
 
     def propagate(carry, craft, setup):
-        """One substep."""
+        """Return the carry after one substep."""
         applied = getattr(carry.state, body.COMMAND)
-        # A held command is allocated once.
+        # A held command is allocated only once.
         commands = tuple(_commands(applied, carry.effectors, setup, carry.memory)) if not named.dynamic else None
         begun = _Begun(commands, applied, carry.actuators)
         state, effectors, outputs = advance(
@@ -287,8 +287,8 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         return carry._replace(state=body.renormalised(state), effectors=effectors, actuators=outputs)
 
     def check(carry, step, setup):
-        """Note the step at which the motion diverges: it is no longer finite, or too fast or too distant for the
-        integration."""
+        """Return the carry with the step at which the motion diverges: when it is no longer finite, too fast for the
+        integration, or beyond the divergence bound."""
         sound = body.is_sound(carry.state, setup)
         lost = where(both(opposite(sound), less(carry.lost_at, 0.0)), number_of(step), carry.lost_at)
         return carry._replace(lost_at=lost)
@@ -318,7 +318,7 @@ def _measured(effector: Part) -> Callable[..., Any]:
 
 
 class _Begun(NamedTuple):
-    """The inputs of a substep: the effectors' commands where they are held, and the actuators' outputs."""
+    """The inputs of a substep: the effectors' held commands, and the actuators' outputs."""
 
     commands: Any
     applied: Any
@@ -326,7 +326,7 @@ class _Begun(NamedTuple):
 
 
 class _Placed(NamedTuple):
-    """A part and its place among those of its role."""
+    """A part and its index among those of its role."""
 
     part: Part
     place: int
@@ -349,13 +349,13 @@ class _Named:
         self.estimating = _in_turn(parts)
 
     def inactive(self, effector: Part, memory: Any) -> Any:
-        """Whether an effector is inactive in the present mode; None for one that never is."""
+        """Return whether an effector is inactive in the present mode; None for one that never is."""
         return self.modes.inactive(effector.name, memory) if self.modes is not None and can_be_inactive(effector) else None
 
 
 def _in_turn(parts: Composition) -> list[tuple[Part, int, int]]:
-    """The law's estimator and those that watch, each with its place and that of the one that starts it (-1: none), which
-    comes before it."""
+    """Return the law's estimator and those that watch, each with its index and that of its starter (-1: none), which comes
+    before it."""
     every = ([] if parts.estimator is None else [parts.estimator]) + [*parts.watchers]
     starters = parts.starters or (-1,) * len(every)
 
@@ -366,8 +366,8 @@ def _in_turn(parts: Composition) -> list[tuple[Part, int, int]]:
 
 
 def _ranges(parts: list[Part]) -> list[int]:
-    """The index of the first random number of each part: the one it requests if it is the first of its name, else one that
-    begins a range of its own."""
+    """Return the index of the first random number of each part: the one that it requests if it is the first of its name,
+    else the start of a range of its own."""
     firsts: list[int] = []
     for place, part in enumerate(parts):
         requested = getattr(part.module, "NUMBERS_FROM", None)
@@ -376,7 +376,7 @@ def _ranges(parts: list[Part]) -> list[int]:
 
 
 def _matrices(inertias: Any) -> Any:
-    """The sum of 3x3 matrices."""
+    """Return the sum of 3x3 matrices."""
     inertia = inertias[0]
     for more in inertias[1:]:
         inertia = tuple(add(a, b) for a, b in zip(inertia, more, strict=True))
@@ -385,5 +385,5 @@ def _matrices(inertias: Any) -> Any:
 
 @cache
 def _readings(names: tuple[str, ...]) -> Any:
-    """The class of all readings of a loop's sensors."""
+    """Return the class of all readings of a loop's sensors."""
     return namedtuple("Readings", names)

@@ -1,6 +1,5 @@
-"""Sensors as they are built: mounted a little otherwise than law and filter take them, with axes of another scale that are
-not at right angles, in steps and within limits, read late and a little off the control instant. What is not asked for leaves
-a sensor's equations as they are."""
+"""Sensors as built: misaligned, with scale-factor errors and non-orthogonal axes, quantised and saturating, delayed and
+with sampling jitter. An error that is not declared does not change a sensor's equations."""
 
 from __future__ import annotations
 
@@ -30,13 +29,13 @@ MOUNTING = Parameter(
     spread=False,
     at_least=-0.5,
     at_most=0.5,
-    text="small turn about the body axes by which it is mounted otherwise than law and filter take it",
+    text="misalignment: small turn about the body axes that law and filter do not know",
 )
 """The declaration of a mounting error, common to all parts."""
 AXES = Parameter(
     shape=(3, 3),
     plain=(0.5, "ppm"),
-    text="errors of its axes: of their scales on the diagonal, beside it those of non-orthogonal ones",
+    text="errors of its axes: scale-factor errors on the diagonal, non-orthogonality off it",
 )
 """The declaration of errors of a sensor's axes, common to all sensors."""
 JITTER = Parameter(
@@ -48,33 +47,33 @@ DELAY = Parameter(
 )
 """The declaration of dead time, common to all sensors."""
 LONGEST = 64
-"""Control periods that a dead time may last."""
+"""The longest dead time, in control periods."""
 ALMOST = 1e-9
-"""A dead time is rounded to a multiple of the control period if it is this near to one, in control periods."""
+"""A dead time this near to a multiple of the control period, in control periods, is rounded to it."""
 
 
 def resolution(unit: str) -> Parameter:
-    """The declaration of the step of what a sensor shows."""
-    return Parameter(unit, at_least=0.0, text="step between what it can show on an axis; none if 0")
+    """Return the declaration of a sensor's resolution."""
+    return Parameter(unit, at_least=0.0, text="resolution (step between readings) on an axis; none if 0")
 
 
 def limit(unit: str) -> Parameter:
-    """The declaration of the most that a sensor shows on an axis."""
-    return Parameter(unit, above=0.0, text="most that it shows on an axis; none if absent")
+    """Return the declaration of a sensor's range on an axis."""
+    return Parameter(unit, above=0.0, text="largest reading on an axis; none if absent")
 
 
 def is_given(*numbers: Any) -> bool:
-    """Whether any of these is nonzero; a number that is being recorded counts as nonzero, because runs may draw it."""
+    """Return whether any of these is nonzero; a recorded number counts as nonzero, because runs may draw it."""
     return any(not isinstance(number, float | int) or number for number in leaves(numbers))
 
 
 def turn_of(mounting: Vector) -> Turn:
-    """The turn from the body axes to those of the mounting, () for none."""
+    """Return the rotation from the body axes to those of the mounting, () for none."""
     return normalise((1.0, *scale(0.5, mounting))) if is_given(mounting) else ()
 
 
 def axes_of(mounting: Vector, errors: Matrix | Vector) -> Axes:
-    """The matrix from body axes to the axes of a sensor as they are, () for the same."""
+    """Return the matrix from body axes to the actual axes of a sensor, () if they are the same."""
     turn = turn_of(mounting)
     if not turn and not is_given(errors):
         return ()
@@ -84,22 +83,22 @@ def axes_of(mounting: Vector, errors: Matrix | Vector) -> Axes:
 
 
 def along(axes: Axes, vector: Vector) -> Vector:
-    """The components of a vector along the actual axes of a sensor."""
+    """Return the components of a vector along the actual axes of a sensor."""
     return apply(axes, vector) if axes else vector
 
 
 def in_body(turn: Turn, vector: Vector) -> Vector:
-    """A vector along the axes of a mounting in body axes."""
+    """Return a vector given in the axes of a mounting in body axes."""
     return to_reference(turn, vector) if turn else vector
 
 
 def step_of(size: float) -> Step:
-    """The step as equations take it, () for none."""
+    """Return the step in the form that equations take, () for none."""
     return (size,) if is_given(size) else ()
 
 
 def shown(vector: Vector, step: Step, most: Scalar) -> Vector:
-    """A vector in steps, and within a limit of each axis."""
+    """Return a vector quantised, and clipped to a limit on each axis."""
     if step:
         x, y, z = each(partial(_in_steps, step[0]), (vector,))
         vector = (x, y, z)
@@ -111,8 +110,8 @@ def _in_steps(step: Scalar, x: Scalar) -> Scalar:
 
 
 class Timing(NamedTuple):
-    """How late a sensor shows a state: whole control periods, a constant of a kernel, and the share of one more; and the
-    jitter of its instants in control periods; () for none."""
+    """The delay of a sensor in whole control periods, which are a constant of a kernel, and a fraction of one more; and its
+    sampling jitter in control periods, () for none."""
 
     periods: int
     share: Step
@@ -120,19 +119,19 @@ class Timing(NamedTuple):
 
 
 PLACE = ("attitude", "position")
-"""Sensors of directions show these fields of the state."""
+"""The fields of the state on which readings of directions depend."""
 Late: TypeAlias = Timing | tuple[()]
 
 
 class Waiting(NamedTuple):
-    """The memory of a sensor, and what it saw at earlier control steps, the newest first."""
+    """The memory of a sensor, and the states it saw at earlier control steps, the newest first."""
 
     sensor: Any
     seen: tuple[tuple[Any, ...], ...]
 
 
 def late_by(delay: float, period: float, jitter: float = 0.0) -> Late:
-    """The dead time and the jitter of a sensor, () for neither. ValueError for a dead time that is too long."""
+    """Return dead time and jitter of a sensor, () for neither. Raise ValueError for a dead time that is too long."""
     if delay > LONGEST * period:
         raise ValueError(f"the delay must be at most {LONGEST} control periods, {LONGEST * period:g} s")
     steps = delay / period
@@ -143,20 +142,19 @@ def late_by(delay: float, period: float, jitter: float = 0.0) -> Late:
 
 
 def awaited(sensor: Any, late: Late, state: Any, names: Sequence[str]) -> Any:
-    """The memory at the start, with that of a sensor itself: these fields of the state were always what they are then."""
+    """Return the initial memory of a delayed sensor, with the sensor's own: before the start these fields were constant."""
     count = late.periods + bool(late.share or late.jitter) if late else 0
     return Waiting(sensor, (tuple(getattr(state, name) for name in names),) * count) if late else sensor
 
 
 def see_start(params: Any, state: Any) -> Any:
-    """The memory at the start of a sensor that remembers nothing itself and looks at the craft's place: the state where it
-    is late."""
+    """Return the initial memory of a sensor of directions without memory of its own: the initial state if it is delayed."""
     return awaited(NoMemory(), params.late, state, PLACE)
 
 
 def arrived(state: Any, memory: Any, late: Late, names: Sequence[str], dice: Dice, place: int) -> tuple[Any, Any, Any]:
-    """The state with these fields as they were when the sensor was read, which change along a straight line between control
-    steps; the memory of the sensor itself; and what it has seen, for `kept`."""
+    """Return the state with these fields as they were at the sampling instant, interpolated linearly between control steps;
+    the sensor's own memory; and the states seen, for `kept`."""
     if not late:
         return state, memory, ()
     now = tuple(getattr(state, name) for name in names)
@@ -174,15 +172,15 @@ def arrived(state: Any, memory: Any, late: Late, names: Sequence[str], dice: Dic
 
 
 def kept(sensor: Any, seen: Any) -> Any:
-    """A sensor's memory for the next control step, which includes this reading."""
+    """Return a sensor's memory for the next control step, which includes this reading."""
     return Waiting(sensor, seen) if seen else sensor
 
 
 def stretch(axes: Axes) -> float:
-    """The most by which the axes change a vector, as a share of it."""
+    """Return the largest relative change of a vector by the errors of the axes."""
     return float(np.linalg.norm(np.array(axes) - np.eye(3), 2)) if axes else 0.0
 
 
 def off_step(size: float) -> float:
-    """The largest error, in norm, of three components in steps."""
+    """Return the largest error, in norm, of three quantised components."""
     return 0.5 * math.sqrt(3.0) * size

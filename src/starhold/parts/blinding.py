@@ -1,4 +1,4 @@
-"""Sun, Moon and the Earth's limb blind an optical head within cones about its boresight."""
+"""Blinding of an optical head by the Sun, the Moon and the Earth's limb within cones about its boresight."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ LIMB = Parameter(
     at_least=0.0,
     text="angles from the boresight within which the Earth's limb blinds: where it is lit, where it is dark; none if both 0",
 )
-"""The declarations of cones, common to all sensors."""
+"""The declaration of the limb's cones, common to all sensors."""
 NONE = (0.0, 0.0)
 RADIUS = BODIES["Earth"].radius
 
@@ -63,7 +63,7 @@ def prepared(
     ephemeris: int,
     period: float,
 ) -> Cones | tuple[()]:
-    """The cones of a head, () without any. ValueError for one that blinds always, and for a bad epoch."""
+    """Return the cones of a head, () without any. Raise ValueError for a cone that always blinds, and for a bad epoch."""
     for name, cone in (("Sun", sun_cone), ("Moon", moon_cone), ("lit limb", limb_cones[0]), ("dark limb", limb_cones[1])):
         if cone >= math.pi:
             shown = f"{math.degrees(cone):g} deg about the boresight"
@@ -85,7 +85,7 @@ def prepared(
 
 
 def check(cones: Cones | tuple[()], start: Any, craft: Craft) -> None:
-    """Raise ValueError where cones have no orbit about the Earth, or its limb is within one whatever the attitude."""
+    """Raise ValueError if the cones have no orbit about the Earth, or the limb lies within one in every attitude."""
     if not cones:
         return
     distance = norm(start.position)
@@ -114,14 +114,14 @@ def is_blind(state: Any, cones: Cones, step: int) -> Truth:
 
 
 def _by_limb(position: Vector, along: Vector, light: Vector, cones: Cones) -> Truth:
-    """Whether the Earth blinds: the angle from its centre is less than that of the limb and of the cone together."""
+    """Return whether the Earth blinds: the boresight is nearer to its centre than the limb's angle plus the cone."""
     inverse = sqrt(1.0 / dot(position, position))
     up, sine = scale(inverse, position), minimum(RADIUS * inverse, 1.0)
     cosine, toward = sqrt(maximum(1.0 - sine * sine, 0.0)), -inverse * dot(position, along)
-    # The limb's point nearest the boresight, times the sine of the boresight's angle from the Earth's centre.
+    # The direction of the limb's point nearest the boresight, times the sine of that one's angle from the centre.
     beside = add(along, scale(toward, up))
     lit = less(0.0, sine * norm(beside) * dot(up, light) + cosine * dot(beside, light))
     (c, s), (dark_c, dark_s) = cones.lit, cones.dark
     c, s = where(lit, c, dark_c), where(lit, s, dark_s)
-    # Beyond half a turn from the centre there is no sky left.
+    # Half a turn from the centre is the whole sky.
     return either(less(cosine * c - sine * s, toward), less(sine * c + cosine * s, 0.0))

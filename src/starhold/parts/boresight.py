@@ -1,4 +1,4 @@
-"""Sensors that look along a boresight: its direction, and the field of view around it."""
+"""The boresight of a sensor, and the field of view around it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ THIRD: Vector = (0.0, 0.0, 1.0)
 
 
 def unit_boresight(boresight: Vector) -> Vector:
-    """Return the unit vector of a boresight. ValueError for one without direction."""
+    """Return the unit vector of a boresight. Raise ValueError if it is zero."""
     size = math.hypot(*boresight)
     if not size > 0.0:
         raise ValueError("the boresight needs a direction")
@@ -21,5 +21,5 @@ def unit_boresight(boresight: Vector) -> Vector:
 
 
 def field_cosine(half_angle: float) -> float:
-    """Return the cosine of half a field of view; the margin for rounding lets half a turn see all."""
+    """Return the cosine of a field of view's half angle, with a margin for rounding so that half a turn sees everything."""
     return math.cos(half_angle) - 1e-12

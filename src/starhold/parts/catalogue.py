@@ -1,4 +1,4 @@
-"""The parts of each role are modules of the role's package with a `CARD`, the entry points `starhold.parts` of other
+"""Finds the parts of each role: modules of the role's package with a `CARD`, entry points `starhold.parts` of other
 packages, and files."""
 
 from __future__ import annotations
@@ -48,24 +48,24 @@ DEMANDED: dict[str, tuple[str, ...]] = {
 }
 """The attributes that a part of each role must define, besides `CARD` and `ROLE`."""
 EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"), "actuator": ("command", "rates")}
-"""Equations that parts of a role have at least one of."""
+"""Equations of which parts of a role must define at least one."""
 BOUNDS: dict[str, tuple[str, ...]] = {
     "bound": ("params", "envelope"),
     "torque_change": ("params", "craft", "envelope"),
     "noise": ("params", "period"),
     "recursion": ("params", "noise", "period", "rate"),
 }
-"""Functions of a part of any role that bound what it does, and their arguments."""
+"""Functions with which a part of any role bounds its effect, and their arguments."""
 BY_NUMBERS: dict[str, tuple[str, ...]] = {"needs": ("params",), "about": ("params",)}
-"""Functions of a part of any role in place of `NEEDS` and `ABOUT`, where these depend on its parameters."""
+"""Functions that replace `NEEDS` and `ABOUT` of a part of any role if these depend on its parameters."""
 
 AnyPart = TypeVar("AnyPart", bound=Part)
 
 
 @cache
 def parts(role: str) -> dict[str, Part]:
-    """All installed parts of a role except laws, by name. One of another package that does not load is left out, with a
-    warning that names it."""
+    """Return all installed parts of a role except laws, by name. A part of another package that does not load is omitted,
+    with a warning that names it."""
     return installed(PACKAGES[role], role, as_part)
 
 
@@ -74,13 +74,14 @@ _BODIES: dict[str, Part] = {}
 
 
 def find(role: str, name: str) -> Part:
-    """The installed part of this role and name, or the body of this name read from a file. KeyError where there is none."""
+    """Return the installed part of this role and name, or the body of this name from a file. Raise KeyError if there is
+    none."""
     installed = parts(role)
     return _BODIES[name] if role == "body" and name not in installed else installed[name]
 
 
 def body_from_file(path: Path) -> Part:
-    """The body in a file, which is executed; from then on the body is found by its name. Errors as of `from_file`."""
+    """Execute a file and return its body, which from then on is found by its name. Errors as in `from_file`."""
     body = from_file(path, parts("body"), as_part)
     if body.role != "body":
         raise ValueError(f"its ROLE must be body, not {body.role}")
@@ -90,14 +91,14 @@ def body_from_file(path: Path) -> Part:
 
 
 def fit(role: str, name: str, *numbers: Any, called: str = "", start: Any = None) -> Fitted:
-    """An installed part with these parameters, for a loop; start: the state of an effector. KeyError for an unknown part."""
+    """Return an installed part with these parameters; start: an effector's state. Raise KeyError for an unknown part."""
     part = find(role, name)
     return Fitted(part, part.params(*numbers), called, start)
 
 
 def telling(readings: Iterable[str]) -> list[Fitted]:
-    """Installed sensors that give these readings, one for each or for several, with parameters of their examples.
-    LookupError where there is none."""
+    """Return installed sensors that give these readings, each with the parameters of its first example; one sensor may give
+    several readings. Raise LookupError if none gives a reading."""
     chosen: dict[str, Fitted] = {}
     for reading in (one for one in readings if one not in GIVEN):
         sensors = (one for one in parts("sensor").values() if not one.table and reading in one.module.Reading._fields)
@@ -110,12 +111,12 @@ def telling(readings: Iterable[str]) -> list[Fitted]:
 
 @cache
 def entries(group: str) -> tuple[EntryPoint, ...]:
-    """Return what all installed packages offer in a group. They are searched once, not for each role."""
+    """Return the entry points of all installed packages in a group. Packages are searched once, not for each role."""
     return tuple(entry_points(group=group))
 
 
 def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str, AnyPart]:
-    """The parts of a role by name: those of a package of starhold, and those that other packages offer."""
+    """Return the parts of a role by name: those in `package`, and those that other packages offer."""
     modules = pkgutil.iter_modules(import_module(package).__path__, f"{package}.")
     collected = [make(import_module(entry.name)) for entry in modules if _declares_card(entry.name)]
     for point in entries("starhold.parts"):
@@ -124,7 +125,7 @@ def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str
         except BaseException as error:
             if is_interrupt(error):
                 raise
-            # The laws' turn warns of it, once.
+            # The search for laws warns of it, once.
             if role == "law":
                 _leave_out(point.value, error)
             continue
@@ -151,7 +152,7 @@ def _loaded(point: Any) -> ModuleType:
 
 
 def role_of(module: ModuleType) -> str | None:
-    """The role that a module declares; a module with `Gains` need not declare that it is a law."""
+    """Return the role that a module declares; a module with `Gains` is a law without declaring it."""
     return getattr(module, "ROLE", "law" if hasattr(module, "Gains") else None)
 
 
@@ -160,7 +161,7 @@ def _leave_out(what: str, error: BaseException) -> None:
 
 
 def as_part(module: ModuleType, path: Path | None = None) -> Part:
-    """The part in a module. ValueError, one line, where it lacks a part of its role's contract."""
+    """Return the part in a module. Raise ValueError, in one line, if it lacks a part of its role's contract."""
     role = role_of(module)
     if role not in DEMANDED:
         raise ValueError(f"{module.__file__}: ROLE must be one of {', '.join(ROLES)}, not {role!r}")
@@ -178,7 +179,7 @@ def as_part(module: ModuleType, path: Path | None = None) -> Part:
 
 
 def _check_equations(part: Part) -> None:
-    """ValueError for an equation, or a bound, that does not take the arguments of its role."""
+    """Raise ValueError for an equation, or a bound, that does not take the arguments of its role."""
     acts = part.role in ("actuator", "effector")
     wanted = (
         BOUNDS | BY_NUMBERS | {"late": ("params", "period")} | {"error": ("params", "envelope") if acts else ("params",)}
@@ -199,7 +200,7 @@ def _check_equations(part: Part) -> None:
 
 
 def make(kind: type[AnyPart], module: ModuleType, path: Path | None, demanded: tuple[str, ...]) -> AnyPart:
-    """An object of this kind for a module with the demanded attributes. ValueError, one line, where it lacks one."""
+    """Return an object of this kind for a module. Raise ValueError, in one line, if it lacks a demanded attribute."""
     missing = [name for name in ("CARD", *demanded) if not hasattr(module, name)]
     if missing:
         raise ValueError(f"{module.__file__}: this {role_of(module) or 'part'} needs {', '.join(missing)}")
@@ -212,10 +213,10 @@ _READ: dict[tuple[Path, str], ModuleType] = {}
 
 
 def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyPart]) -> AnyPart:
-    """The part in a file, which is executed; known: the installed parts of its role, of which it may be one.
+    """Execute a file and return its part; known: the installed parts of its role, which may include it.
 
-    ValueError, one line, where the file is not Python, fails, lacks a part of the contract, or has the name of another
-    part that is installed. OSError where it cannot be read."""
+    Raise ValueError, in one line, if the file is not Python, fails, lacks a part of the contract, or has the name of
+    another installed part, and OSError if it cannot be read."""
     path = _real(path)
     same = next((part for part in known.values() if _is_of(part, path)), None)
     if same is not None:
@@ -227,16 +228,16 @@ def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyP
 
 
 def read_module(path: Path) -> ModuleType:
-    """Run a Python file as a module, again if its text has changed. Errors as of `from_file`."""
+    """Run a Python file as a module, and again if its text has changed. Errors as in `from_file`."""
     given, path = path, _real(path)
     source = read_bytes(path)
-    # The suffix as given counts too: a link that is called a table is not run.
+    # The suffix of the link counts too: a link named like a table is not run.
     if {given.suffix, path.suffix} != {".py"}:
         raise ValueError("a part's file ends in .py")
     key = (path, hashlib.sha256(source).hexdigest())
     if key in _READ:
         return _READ[key]
-    # A unique name, so that a file called random.py does not hide the library's, nor one text of a file another.
+    # A unique name, so that a file called random.py does not hide the library's module, nor one version of a file another.
     place = hashlib.sha256(str(path).encode(errors="replace")).hexdigest()
     module = ModuleType(f"starhold_part_{path.stem}_{place[:8]}_{key[1][:8]}")
     module.__file__ = str(path)
@@ -255,12 +256,12 @@ def read_module(path: Path) -> ModuleType:
 
 
 def _real(path: Path) -> Path:
-    """The path with links resolved; a loop of links is left as it is, so that opening it reports the error."""
+    """Return the path with links resolved; a loop of links stays as it is, so that opening it reports the error."""
     return Path(os.path.realpath(path))
 
 
 def error_line(error: BaseException, path: Path | None = None) -> str:
-    """An error in one line, with the line of a file that it comes from."""
+    """Return an error in one line, with the line of the file from which it comes."""
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if path and frame.filename == str(path)]
     place = f"{path.name}, line {lines[-1]}: " if path and lines else ""
     return f"{place}{type(error).__name__}: {' '.join(str(error).split())}"

@@ -1,8 +1,8 @@
-"""The contract that every part of a closed loop keeps, whatever its role.
+"""The contract of every part of a closed loop, in any role.
 
-A part is one file: `CARD` describes it, `ROLE` names its role in a loop, `class Params(NamedTuple)` declares its
-numbers with units and bounds, and `examples()` gives some of them. The equations of each role, and further
-declarations, stand in `roles`. All of them are pure functions of tuples of numbers.
+A part is one file: `CARD` describes it, `ROLE` names its role in a loop, `class Params(NamedTuple)` declares its numbers
+with units and bounds, and `examples()` returns some instances. `roles` lists the equations of each role, and further
+declarations. All equations are pure functions of tuples of numbers.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ CLOCK = "time"
 """The reading that every loop gives to a law that declares it: seconds since the start. No sensor is needed for it."""
 
 IS_VALID = "is_valid"
-"""Whether an estimate can be relied on, which all estimators tell; a law that declares it as a reading gets that of its
-estimate, and 1 where there is no estimator."""
+"""Whether an estimate can be relied on, which all estimators state; a law that declares it as a reading gets that of its
+estimate, and 1 without an estimator."""
 
 GIVEN = (CLOCK, IS_VALID)
 """Readings that no sensor has to give."""
 
 
 FIX = "fix"
-"""The reading that an estimator gets which another one starts: the other's estimate, to be used once it is valid."""
+"""The reading of an estimator that another one starts: the other's estimate, to be used once it is valid."""
 
 
 class NoMemory(NamedTuple):
-    """The memory of a part that keeps nothing."""
+    """The memory of a part without one."""
 
 
 class NoParams(NamedTuple):
@@ -42,9 +42,9 @@ class NoParams(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """The largest errors that a sensor makes besides its noise: of the attitude (rad), of the rate (rad/s) and of the
-    magnetic field (T) that it gives, in norm; `inf` for one without a bound. `bias`: the part of that of the rate that stays
-    as it is in body axes (rad/s), which a filter takes out; it takes out no other error."""
+    """Bounds on the norms of a sensor's errors besides noise: of the attitude (rad), the rate (rad/s) and the magnetic
+    field (T); `inf` for no bound. `bias`: the part of the rate's error that is constant in body axes (rad/s), the only
+    error that a filter removes."""
 
     attitude: float = 0.0
     rate: float = 0.0
@@ -56,15 +56,15 @@ NO_ERRORS, UNBOUNDED = Errors(), Errors(math.inf, math.inf, math.inf)
 
 
 DEVIATIONS = 8.0
-"""How many deviations a Gaussian vector is taken to be long at most where a part bounds by it what it does."""
+"""The length, in standard deviations, that a Gaussian vector is assumed not to exceed where a part uses it in a bound."""
 
 
 class Noise(NamedTuple):
-    """The Gaussian errors of sensors, as multiples of independent standard normal vectors: of an attitude (3, 3; rad), which
-    is new after each `every` control periods, and at each control step of the rate (rad/s) and of the change of a gyro's
-    bias until the next (rad/s); the deviation about each axis of that of the magnetic field (T); of the attitudes of further
-    sensors (3, 3; rad), new at the same steps. Of an environment the deviation about each axis of a torque (N m) that is new
-    at each control step and held until the next."""
+    """The Gaussian errors of sensors, as multiples of independent standard normal vectors: of an attitude (3, 3; rad), new
+    every `every` control periods; at each control step, of the rate (rad/s) and of the change of a gyro's bias until the
+    next (rad/s); the standard deviation per axis of the magnetic field's error (T); and of the attitudes of further sensors
+    (3, 3; rad), new at the same steps. For an environment, the standard deviation per axis of a torque (N m) that is new at
+    each control step and held until the next."""
 
     attitude: Matrix = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     every: int = 1
@@ -76,24 +76,24 @@ class Noise(NamedTuple):
 
 
 class Recursion(NamedTuple):
-    """How noise drives small errors of what a law is told, linearly. At a control step an equation takes `errors` and the
-    standard normal `noise` of rate, bias and each attitude, tuples of vectors, to the errors that are kept for the next step
-    and to those of attitude (rad) and rate (rad/s) that the law is told: `corrected` at every `every`-th step, at which
+    """The linear recursion by which noise drives small errors of the estimate. At a control step an equation maps `errors`
+    and the standard normal `noise` of rate, bias and each attitude, tuples of vectors, to the errors at the next step and
+    the errors of attitude (rad) and rate (rad/s) that the law gets: `corrected` at every `every`-th step, at which
     attitudes are new, and `carried` at the others."""
 
     corrected: Callable[..., tuple[tuple[Vector, ...], Vector, Vector]]
     carried: Callable[..., tuple[tuple[Vector, ...], Vector, Vector]]
     every: int
     size: int
-    """How many vectors of errors are kept."""
+    """Number of vectors of errors."""
     noises: int = 3
-    """How many vectors of noise there are."""
+    """Number of vectors of noise."""
 
 
 class Envelope(NamedTuple):
-    """Bounds the motions of a loop, for parts that bound what they do: the least distance from the centre of
+    """Bounds on the motions of a loop, from which parts bound their effect: the least distance from the centre of
     attraction (m) and the largest speed (m/s) of the orbit, the angular momentum of body and wheels together (N m s), the
-    body's largest moment of inertia (kg m2), and the error of the magnetic field that is measured (T)."""
+    body's largest moment of inertia (kg m2), and the error of the measured magnetic field (T)."""
 
     distance: float
     speed: float
@@ -103,11 +103,11 @@ class Envelope(NamedTuple):
 
 
 class Orbit(NamedTuple):
-    """Bounds of an orbit, for targets that bound by it how they move: the least distance from the centre of attraction (m),
-    the largest speed (m/s), the rate (rad/s) and the acceleration (rad/s2) of the orbital frame, the gravitational parameter
-    (m3/s2), and the direction of the angular momentum at the start. Forces beside that of a point mass move the craft by no
-    more than `force` (m/s2), and the frame otherwise than in two-body motion by no more than `off_rate` (rad/s) and
-    `off_acceleration` (rad/s2)."""
+    """Bounds on an orbit, from which targets bound their motion: the least distance from the centre of attraction (m), the
+    largest speed (m/s), the rate (rad/s) and the acceleration (rad/s2) of the orbital frame, the gravitational parameter
+    (m3/s2), and the direction of the angular momentum at the start. Accelerations besides that of a point mass are at most
+    `force` (m/s2), and they change the frame's rate and acceleration from those of two-body motion by at most `off_rate`
+    (rad/s) and `off_acceleration` (rad/s2)."""
 
     nearest: float
     speed: float
@@ -121,9 +121,9 @@ class Orbit(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Bounds of how a target moves: its rate (rad/s) and acceleration (rad/s2), `inf` for one without; how far those that it
-    gives may be off (rad/s, rad/s2); until when, since the start of the flight, all this holds (s); and whether its attitude
-    or its rate jumps at some instants, between which it holds."""
+    """Bounds on the motion of a target: its rate (rad/s) and acceleration (rad/s2), `inf` for no bound; the errors of those
+    that it states (rad/s, rad/s2); the time since the start of the flight until which the bounds hold (s); and whether its
+    attitude or rate jumps at some instants, between which they hold."""
 
     rate: float
     acceleration: float
@@ -134,13 +134,13 @@ class Motion(NamedTuple):
 
 
 AT_REST, UNLIMITED = Motion(0.0, 0.0), Motion(math.inf, math.inf)
-"""The motion of a target that rests, and of one without bounds."""
+"""The motion of a target at rest, and of one without bounds."""
 
 
 class Push(NamedTuple):
-    """A bound of the norm of a torque or of an error of the command, which may grow with the body's rate: `torque` (N m),
-    and `per_rate` (N m s) times the norm of the rate (rad/s); `inf` for one without a bound. Of how fast a torque changes
-    both are so much per second."""
+    """A bound on the norm of a torque or of an error of the command, which may grow with the body's rate: `torque` (N m)
+    plus `per_rate` (N m s) times the norm of the rate (rad/s); `inf` for no bound. As a bound on the rate of change of a
+    torque, both are per second."""
 
     torque: float
     per_rate: float = 0.0
@@ -174,13 +174,13 @@ class Card:
 
 @dataclass(frozen=True)
 class Parameter:
-    """Unit, bounds and shape of one parameter, or of a law's gain, declared as an annotation."""
+    """Unit, bounds and shape of a parameter or of a law's gain, declared as an annotation."""
 
     unit: str = "1"
     """The unit of plain numbers: "N m s", "1/s^2"; "1" for none."""
     also: str = ""
-    """A further unit that strings may have, as data sheets give it, in which the quantity is the same number: a deviation
-    over a second in "rad/s" is that of white noise in "rad/sqrt(s)"."""
+    """A further unit allowed in strings, used by data sheets, in which the quantity has the same value: a standard
+    deviation over one second in "rad/s" is that of white noise in "rad/sqrt(s)"."""
     above: float | None = None
     """Every number is greater."""
     at_least: float | None = None
@@ -188,26 +188,26 @@ class Parameter:
     at_most: float | None = None
     """No number is greater."""
     shape: tuple[int, ...] = ()
-    """() a number, (3,) a vector, (3, 3) a matrix, for which a number stands for that multiple of the identity and a vector
-    for a diagonal. A part gets a diagonal matrix as the vector of its diagonal; `apply` and `solve` take both forms."""
+    """() a number, (3,) a vector, (3, 3) a matrix, for which a number means that multiple of the identity and a vector a
+    diagonal. A part gets a diagonal matrix as the vector of its diagonal; `apply` and `solve` accept both forms."""
     whole: bool = False
-    """A whole number, which is a constant of the part while it is recorded: Python's `if` and `range` may use it."""
+    """An integer, which is a constant of the part while it is recorded: Python's `if` and `range` may use it."""
     choices: tuple[str, ...] = ()
-    """Words to choose from; the part gets the place of the chosen one: 0, 1, ...; a constant as well."""
+    """The allowed words; the part gets the index of the chosen one, 0, 1, ..., also a constant."""
     text: str = ""
     """The meaning, for listings and pages."""
     spread: bool = True
-    """Whether a number stands for a vector of equal numbers."""
+    """Whether a single number means a vector of equal numbers."""
     plain: tuple[float, str] | None = None
-    """The largest number that a file may hold without its unit, well above any of its kind, and the unit that a larger one
-    may be meant in."""
+    """The largest number that a file may give without a unit, well above any real value, and the unit in which a larger one
+    was probably meant."""
     columns: tuple[str, ...] = ()
-    """The names of a table's columns. The table is given as rows, or as the name of a CSV file of them."""
+    """The names of a table's columns. The table is given as rows, or as the name of a CSV file."""
     dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""
     """The physical dimension of a scaled number, which a file may also give as a string with a unit."""
     shared: str = ""
-    """The key of a scenario, "orbit.epoch", that gives the number to all parts that declare it, in place of keys of
-    their own tables, which scenarios without such a key use."""
+    """The key of a scenario, such as "orbit.epoch", that gives the number to all parts that declare it; scenarios without
+    this key use keys of the parts' own tables."""
 
     @property
     def units(self) -> str:
@@ -215,7 +215,7 @@ class Parameter:
         return f"{self.unit} or {self.also}" if self.also else self.unit
 
     def check(self, value: Any) -> Any:
-        """Validate a value and convert it to the form that equations take; the ValueError says what is allowed."""
+        """Return a value, validated and in the form that equations take. The ValueError says what is allowed."""
         if self.choices:
             if value not in self.choices:
                 raise ValueError(f"must be one of {', '.join(self.choices)}")
@@ -223,7 +223,7 @@ class Parameter:
         try:
             array = np.asarray(value, dtype=float)
         except (ValueError, TypeError):
-            # Rows of different lengths, or entries that are no numbers.
+            # Rows of different lengths, or entries that are not numbers.
             raise ValueError(f"must be {self.describe()}") from None
         if self.columns and (array.ndim != 2 or array.shape[1] != len(self.columns)):
             raise ValueError(f"must be {self.describe()}")
@@ -235,13 +235,13 @@ class Parameter:
             if array.ndim == 0:
                 array = array * np.eye(self.shape[0])
             elif array.shape == self.shape[:1]:
-                # No longer one, whose square would fill the memory.
+                # No longer vector, whose square matrix would fill the memory.
                 array = np.diag(array)
         elif array.ndim == 0 and self.shape and self.spread:
             array = np.full(self.shape, float(array))
         if array.shape != self.shape:
             raise ValueError(f"must be {self.describe()}")
-        # Bounds of a matrix speak of its eigenvalues' sign only where the part says so; entries are free.
+        # The entries of a matrix are free: a part that needs bounds checks its eigenvalues.
         if self.shape != (3, 3):
             self._check_bounds(array)
         if self.whole:
@@ -264,7 +264,7 @@ class Parameter:
         return f"{math.degrees(bound):.6g} deg" if bound and self.unit == "rad" else f"{bound:g}"
 
     def describe(self) -> str:
-        """Describe the values that may be written for this parameter."""
+        """Return a description of the values allowed for this parameter."""
         if self.columns:
             return f"rows of {', '.join(self.columns)}, or the name of a CSV file of such columns"
         if not self.shape:
@@ -285,14 +285,14 @@ class Field:
     default: Any = field(default=None)
 
     def written(self, value: Any) -> Any:
-        """Return a value as a file has it: a choice by its word."""
+        """Return a value as written in a file: a choice by its word."""
         return self.gain.choices[int(value)] if self.gain.choices else value
 
 
 @cache
 def fields(cls: Any, but: str = "") -> list[Field]:
-    """Read the declared parameters of a NamedTuple class (`Params`, `Gains`, a design form), in order; `but`: the name of a
-    field that is left out."""
+    """Return the declared parameters of a NamedTuple class (`Params`, `Gains`, a design form), in order; `but`: the name of
+    a field to omit."""
     declared: list[Field] = []
     hints = get_type_hints(cls, include_extras=True)
     for name in cls._fields:

@@ -1,5 +1,5 @@
-"""Filters keep covariances of errors of an attitude and of three numbers that its rate depends on, in blocks; what they
-assume of a gyro."""
+"""Block covariances of the errors of an attitude and of three numbers on which its rate depends, for filters, and the gyro
+noise that filters assume."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from starhold.algebra.scalar import Scalar, sqrt
 from starhold.algebra.vector import Matrix, Vector, combine, multiply, transpose
 from starhold.parts.contract import Parameter
 
-GYRO_NOISE = Parameter("rad/s", also="rad/sqrt(s)", at_least=0.0, text="of the gyro: deviation of the mean over a second")
-GYRO_WALK = Parameter("rad/s", also="rad/s/sqrt(h)", at_least=0.0, text="of the gyro: deviation of the bias's change in 1 h")
-GYRO_BIAS = Parameter("rad/s", above=0.0, text="of the gyro: deviation of the bias at the start")
+GYRO_NOISE = Parameter("rad/s", also="rad/sqrt(s)", at_least=0.0, text="gyro: standard deviation of the mean over 1 s")
+GYRO_WALK = Parameter("rad/s", also="rad/s/sqrt(h)", at_least=0.0, text="gyro: standard deviation of the bias change in 1 h")
+GYRO_BIAS = Parameter("rad/s", above=0.0, text="gyro: standard deviation of the bias at the start")
 
 
 def carried(turn: Matrix, mixed: Matrix, walk: Matrix, axes: Matrix, drift: Matrix) -> tuple[Matrix, Matrix]:
-    """The covariance of the attitude's error, and that with the three numbers', where the attitude's error is multiplied by
-    `axes` and the numbers' times `drift` added to it."""
+    """Return the covariance of the attitude's error and its cross-covariance with the three numbers, after the attitude's
+    error is multiplied by `axes` and `drift` times the numbers' error is added to it."""
     after = summed(multiply(axes, mixed), multiply(drift, walk))
     spread = summed(
         multiply(summed(multiply(axes, turn), multiply(drift, transpose(mixed))), transpose(axes)),

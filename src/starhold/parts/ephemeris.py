@@ -1,9 +1,10 @@
-"""Sun and Moon by series, to a thousandth of a degree, for parts that are set to use it.
+"""Series for Sun and Moon, accurate to a thousandth of a degree, for parts that select them.
 
-The Sun's longitude is that of VSOP87 (Bretagnon and Francou 1988) with the terms above 0.3", less the aberration; its
-latitude, below 1.2", is left out. The Moon's place is that of Meeus, Astronomical Algorithms, chapter 47, without light
-time, after ELP-2000/82 (Chapront-Touze and Chapront 1983). Both are in the mean equator and equinox of the epoch, where the
-axes rest. What changes over decades is taken at the epoch with its rate, which holds for flights of up to a year.
+The Sun's longitude is that of VSOP87 (Bretagnon and Francou 1988) with the terms above 0.3", minus the aberration; its
+latitude, below 1.2", is neglected. The Moon's position is that of Meeus, Astronomical Algorithms, chapter 47, without light
+time, after ELP-2000/82 (Chapront-Touze and Chapront 1983). Both refer to the mean equator and equinox of the epoch, which
+are kept fixed. Quantities that change over decades have their value and rate at the epoch, which is accurate for flights of
+up to a year.
 """
 
 from __future__ import annotations
@@ -34,13 +35,13 @@ CENTURY = 36525.0
 Turning: TypeAlias = tuple[Scalar, Scalar]
 """Cosine and sine of an angle."""
 _LATE = ((1950, 29.2), (1960, 33.2), (1972, 42.2), (1980, 50.8), (1990, 57.0), (1999, 64.2), (2006, 65.2), (2017, 69.2))
-"""Years, and by how many seconds Terrestrial Time is then ahead of UTC; on as at the last."""
+"""Years, and the lead (s) of Terrestrial Time over UTC in them; constant after the last."""
 _PRECESSION = 5028.796195 / 3600.0
-"""Degrees in a century by which longitudes of date grow."""
+"""General precession in longitude, degrees per century."""
 _ABERRATION = 20.49552 / 1296000.0
-"""Turns at one astronomical unit."""
+"""Aberration at one astronomical unit, in turns."""
 _MILLENNIUM = 10.0 * CENTURY * DAY
-# 1e-8 rad; rad at J2000, and in a millennium. The first two change with time: their factors of its powers.
+# Amplitude (1e-8 rad), phase at J2000 (rad) and rate (rad per millennium). The first two are polynomials in time.
 _SUN = """3341656 4.6692568 6283.07585, 34894 4.6261 12566.1517, 3497 2.7441 5753.3849, 3418 2.8289 3.5231,
 3136 3.6277 77713.7715, 2676 4.4181 7860.4194, 2343 6.1352 3930.2097, 1324 0.7425 11506.7698, 1273 2.0371 529.691,
 1199 1.1096 1577.3435, 990 5.233 5884.927, 902 2.045 26.298, 857 3.508 398.149, 780 1.179 5223.694, 753 2.533 5507.553,
@@ -49,7 +50,7 @@ _SUN = """3341656 4.6692568 6283.07585, 34894 4.6261 12566.1517, 3497 2.7441 575
 126 1.083 20.775"""
 _GROWING = (((206059.0, 2.678235), (8720.0, 1.0721)), ((4303.0, 2.6351), (309.0, 0.867)))
 _SLOW = 1000.0
-"""Terms below this rate (rad in a millennium) are taken at the epoch, with their rates."""
+"""Terms below this rate (rad per millennium) have their value and rate at the epoch."""
 # Multiples of elongation, the Sun's and the Moon's anomaly and the argument of latitude; 1e-6 deg and m, or 1e-6 deg.
 _PLACE = """0 0 1 0 6288774 -20905355, 2 0 -1 0 1274027 -3699111, 2 0 0 0 658314 -2955968, 0 0 2 0 213618 -569925,
 0 1 0 0 -185116 48888, 0 0 0 2 -114332 -3149, 2 0 -2 0 58793 246158, 2 -1 -1 0 57066 -152138, 2 0 1 0 53322 -170733,
@@ -70,7 +71,7 @@ _LATITUDE = """0 0 0 1 5128122, 0 0 1 1 280602, 0 0 1 -1 277693, 2 0 0 -1 173237
 2 0 2 1 422, 2 0 -3 -1 421, 2 1 -1 1 -366, 2 1 0 1 -351, 4 0 0 1 331, 2 -1 1 1 315, 2 -2 0 -1 302, 0 0 1 3 -283,
 2 1 1 -1 -229, 1 1 0 -1 223, 1 1 0 1 223, 0 1 -2 -1 -220, 2 1 -1 -1 -220, 1 0 1 1 -185, 2 -1 -2 -1 181, 0 1 2 1 -177,
 4 0 -2 -1 176, 4 -1 -1 -1 166, 1 0 1 -1 -164, 4 0 1 -1 132, 1 0 -1 -1 -119, 4 -1 0 -1 115, 2 -2 0 1 107"""
-# Degrees at J2000, in a century, in its square: the mean longitude, and the four angles.
+# Degrees at J2000, per century, per century squared: the mean longitude, and the four angles.
 _MEAN = (218.31665436, 481267.88123421, -0.0015786)
 _ANGLES = (
     (297.8501921, 445267.1114034, -0.0018819),
@@ -89,8 +90,8 @@ QUICK = [row for row in SUN[2:] if row[2] > _SLOW]
 
 
 class Solar(NamedTuple):
-    """At the epoch the Sun's mean longitude (turns) with its rate (turns/s), the two largest terms (turns), the angles of
-    the terms (turns), and cosine and sine of the equator's slope."""
+    """The Sun at the epoch: mean longitude (turns) and its rate (turns/s), the two largest terms (turns), the angles of the
+    terms (turns), and cosine and sine of the obliquity."""
 
     mean: Scalar
     rate: Scalar
@@ -101,9 +102,9 @@ class Solar(NamedTuple):
 
 
 class Lunar(NamedTuple):
-    """At the epoch the Moon's mean longitude (turns), the angles (turns), the factor of the Sun's anomaly; of terms by the
-    planets the factors (deg) of cosine and sine of the mean longitude, in longitude and in latitude, and of the cosine of
-    the argument of latitude; cosine and sine of the equator's slope."""
+    """The Moon at the epoch: mean longitude (turns), the angles (turns), the factor of the Sun's anomaly; for planetary
+    terms the factors (deg) of cosine and sine of the mean longitude, in longitude and in latitude, and of the cosine of the
+    argument of latitude; cosine and sine of the obliquity."""
 
     mean: Scalar
     angles: tuple[Scalar, ...]
@@ -116,20 +117,20 @@ class Lunar(NamedTuple):
 
 
 def centuries_of(epoch: Date) -> float:
-    """Julian centuries of Terrestrial Time since J2000."""
+    """Return the Julian centuries of Terrestrial Time since J2000."""
     days = days_of(epoch)
     years, late = zip(*_LATE, strict=True)
     return (days + float(np.interp(2000.0 + days / 365.25, years, late)) / DAY) / CENTURY
 
 
 def slope_of(centuries: float) -> tuple[float, float]:
-    """Cosine and sine of the mean slope of the equator (IAU 2006)."""
+    """Return cosine and sine of the mean obliquity (IAU 2006)."""
     slope = radians((84381.406 - 46.836769 * centuries) / 3600.0)
     return cos(slope), sin(slope)
 
 
 def solar(epoch: Date) -> Solar:
-    """The numbers of the Sun for a flight that begins at an epoch (UTC)."""
+    """Return the numbers of the Sun for a flight that begins at an epoch (UTC)."""
     centuries = centuries_of(epoch)
     t = centuries / 10.0
     mean = 175347046.0 + 628331966747.0 * t + 52919.0 * t * t
@@ -154,11 +155,11 @@ def solar(epoch: Date) -> Solar:
 
 
 def sun_at(time: Scalar, params: Solar) -> tuple[Vector, Scalar]:
-    """The unit vector from the Earth to the apparent Sun, and its distance (astronomical units), at a time (s) after the
-    start."""
+    """Return the unit vector from the Earth to the apparent Sun, and its distance (astronomical units), at a time (s) after
+    the start."""
     speeds = [speed for _, _, speed in (*SUN[:2], *QUICK)]
     turns = [begin + speed / (tau * _MILLENNIUM) * time for begin, speed in zip(params.angles, speeds, strict=True)]
-    # The first angle is the anomaly less a quarter of a turn.
+    # The first angle is the anomaly minus a quarter turn.
     c, s = cosine_sine(turns[0])
     sizes = [params.sizes[1], *(1e-8 / tau * size for size, _, _ in QUICK)]
     ahead = params.sizes[0] * c + sum(size * cosine_sine(turn)[0] for size, turn in zip(sizes, turns[1:], strict=True))
@@ -168,7 +169,7 @@ def sun_at(time: Scalar, params: Solar) -> tuple[Vector, Scalar]:
 
 
 def lunar(epoch: Date) -> Lunar:
-    """The numbers of the Moon for a flight that begins at an epoch (UTC)."""
+    """Return the numbers of the Moon for a flight that begins at an epoch (UTC)."""
     t = centuries_of(epoch)
     mean, *angles = (a + (b + c * t) * t for a, b, c in (_MEAN, *_ANGLES))
     venus = radians(119.75 + 131.849 * t)
@@ -185,18 +186,18 @@ def lunar(epoch: Date) -> Lunar:
 
 
 def moon_at(time: Scalar, params: Lunar) -> Vector:
-    """The Moon's place (m, inertial axes, from the Earth's centre) at a time (s) after the start."""
+    """Return the Moon's position (m, inertial axes, from the Earth's centre) at a time (s) after the start."""
     per_second = 1.0 / (360.0 * CENTURY * DAY)
     mean = params.mean + (_MEAN[1] - _PRECESSION) * per_second * time
     units = [
         cosine_sine(begin + per_second * rate * time) for begin, (_, rate, _) in zip(params.angles, _ANGLES, strict=True)
     ]
-    # Terms shrink with the eccentricity of the Earth's orbit, once for each multiple of the Sun's anomaly.
+    # Terms are scaled by the eccentricity factor of the Earth's orbit, once for each multiple of the Sun's anomaly.
     units[1] = params.eccentricity * units[1][0], params.eccentricity * units[1][1]
     known: dict[tuple[int, ...], Turning] = {(0, 0, 0, 0): (1.0, 0.0)}
 
     def turned(*multiples: int) -> Turning:
-        """Cosine and sine of a sum of multiples of the angles: one step from a sum with a smaller multiple."""
+        """Return cosine and sine of a sum of multiples of the angles, in one step from a sum with a smaller multiple."""
         if multiples not in known:
             place = next(k for k in (3, 2, 1, 0) if multiples[k])
             sense = 1 if multiples[place] > 0 else -1
@@ -225,5 +226,5 @@ def moon_at(time: Scalar, params: Lunar) -> Vector:
 
 
 def _both(a: Turning, b: Turning) -> Turning:
-    """Cosine and sine of the sum of two angles."""
+    """Return cosine and sine of the sum of two angles."""
     return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]

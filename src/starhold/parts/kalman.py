@@ -1,5 +1,5 @@
-"""The equations of the multiplicative extended Kalman filter: how attitude, gyro bias and the covariances of their errors
-are carried on by the gyro and corrected by attitudes and directions."""
+"""The multiplicative extended Kalman filter: propagation of attitude, gyro bias and error covariances by the gyro, and
+their correction by attitudes and directions."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from starhold.parts.covariance import along_diagonal, carried, summed, symmetric
 from starhold.parts.vectors import Known, Pair, information
 
 Head: TypeAlias = tuple[Quaternion, Truth]
-"""An attitude that star trackers show, and whether it is new."""
+"""An attitude from star trackers, and whether it is new."""
 
 
 class Numbers(NamedTuple):
-    """The attitude stated for the start. Variances: of it (rad2), of the bias then (rad2/s2), of the tracker's attitude
-    (rad2, body axes; () without one), and what the noise of one reading of the gyro adds to that of the attitude; what the
-    walk of the bias adds in a control period to those of attitude, attitude with bias, and bias. The inverse variances of
-    all trackers' attitudes (1/rad2), where there are several. The largest deviation of an attitude that counts as valid
-    (rad). The directions that are taken, () for none."""
+    """The stated initial attitude. Variances: of it (rad2), of the initial bias (rad2/s2), of the tracker's attitude (rad2,
+    body axes; () without one), and of the attitude due to the noise of one gyro reading; the process noise of the bias's
+    walk in a control period in the covariances of attitude, attitude with bias, and bias. The inverse covariances of the
+    attitudes of several trackers (1/rad2). The largest standard deviation of a valid attitude (rad). The directions that
+    are used, () for none."""
 
     start: Quaternion
     start_turn: Scalar
@@ -54,12 +54,12 @@ class Numbers(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The attitude at the last control step, the bias and the gyro's reading then (rad/s), the covariance of the errors of
-    attitude (rad, body axes) and bias in blocks, 0 before the first reading, 1 before the first attitude, 2 after it, and
-    the number of the control step, () where nothing depends on it.
+    """The attitude at the last control step, the bias and the gyro's reading then (rad/s), the block covariance of the
+    errors of attitude (rad, body axes) and bias, the phase (0 before the first reading, 1 before the first attitude, 2
+    after it), and the number of the control step, () if nothing depends on it.
 
-    Half the noise of that reading has turned the attitude in the period before, half will turn it in the period that
-    begins. A new attitude corrects this noise too, because the attitude and its error are kept less half a period of it.
+    Half the noise of that reading has turned the attitude in the previous period, and half will turn it in the next. A new
+    attitude corrects this noise too, because the stored attitude and its error exclude half a period of it.
     """
 
     attitude: Quaternion
@@ -73,8 +73,8 @@ class Memory(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """The gains from what a measurement is off: to the attitude, to the one that is kept, and to the bias; and what all of
-    them have in common, for a new attitude the inverse of the covariance of its deviation from the one foretold (1/rad2)."""
+    """The gains on a residual for the attitude, the stored attitude and the bias; and their common factor, which for a new
+    attitude is the inverse covariance of the innovation (1/rad2)."""
 
     turn: Matrix
     ahead: Matrix
@@ -83,7 +83,8 @@ class Gains(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """The gains for the deviation of an attitude, which the covariances follow from; those for what is off, and this."""
+    """The gains for the residual of an attitude, which give the new covariances; those for the actual residual, and
+    this."""
 
     whole: Gains
     gain: Gains
@@ -91,8 +92,8 @@ class Correction(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """The attitude at a control step, the covariance of its error, the noise of the gyro's reading as far as it is
-    known (rad/s), and the memory."""
+    """The attitude at a control step, the covariance of its error, the estimated noise of the gyro's reading (rad/s), and
+    the memory."""
 
     attitude: Quaternion
     turn: Matrix
@@ -101,20 +102,20 @@ class Instant(NamedTuple):
 
 
 def arrived(before: Memory, params: Numbers) -> Instant:
-    """The estimate at a control step before it is corrected."""
+    """Return the estimate at a control step before its correction."""
     ahead = along_diagonal(before.turn, 3.0 * params.reading)
     return Instant(before.attitude, before.turn, ZERO, before._replace(turn=ahead))
 
 
 def taken(now: Instant, measured: Quaternion, params: Numbers) -> Instant:
-    """The first attitude, taken as it is: its error has nothing to do with the bias, nor with the noise of the gyro."""
+    """Return the estimate with the first attitude: its error is independent of the bias and of the gyro's noise."""
     ahead = along_diagonal(params.tracker, params.reading)
     memory = now.memory._replace(attitude=measured, turn=ahead, mixed=(ZERO, ZERO, ZERO))
     return Instant(measured, params.tracker, ZERO, memory)
 
 
 def correction(now: Instant, heads: list[Head], pairs: list[Pair], params: Numbers) -> Correction:
-    """The gains for what is measured at a control step, all at once, which is as good as one after the other."""
+    """Return the gains for all measurements of a control step at once, which is equivalent to one after the other."""
     if not params.directions:
         off = small_turn(now.attitude, heads[0][0])
         gain = gains(now, params, inverse(summed(now.turn, params.tracker)))
@@ -128,7 +129,7 @@ def correction(now: Instant, heads: list[Head], pairs: list[Pair], params: Numbe
 
 
 def corrected(now: Instant, by: Correction, params: Numbers, period: Scalar) -> Instant:
-    """The estimate of attitude, bias and noise, corrected by what is measured."""
+    """Return the estimate of attitude, bias and noise, corrected by the measurements."""
     before, (whole, gain, off) = now.memory, by
     memory = before._replace(
         attitude=turned_by(now.attitude, apply(gain.ahead, off)),
@@ -146,18 +147,18 @@ def corrected(now: Instant, by: Correction, params: Numbers, period: Scalar) -> 
 
 
 def gains(now: Instant, params: Numbers, common: Matrix) -> Gains:
-    """The gains that have this in common."""
+    """Return the gains with this common factor."""
     ahead, bias = product(twice_read(now, params), common), product(transpose(now.memory.mixed), common)
     return Gains(product(now.turn, common), ahead, bias, common)
 
 
 def twice_read(now: Instant, params: Numbers) -> Matrix:
-    """The covariance of the attitude that is kept with the present one: it has the noise of the reading twice."""
+    """Return the cross-covariance of the stored and the present attitude, which has the noise of the reading twice."""
     return along_diagonal(now.turn, params.reading)
 
 
 def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) -> Memory:
-    """The estimate a control period on: the rate between the gyro's two readings is their mean."""
+    """Return the estimate propagated by a control period: the rate between two gyro readings is their mean."""
     mean = subtract(scale(0.5, add(memory.rate, rate)), memory.bias)
     turn, axes, drift = turned(mean, period)
     spread, mixed = carried(memory.turn, memory.mixed, memory.walk, axes, drift)
@@ -170,7 +171,7 @@ def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) ->
 
 
 def turned(rate: Vector, period: Scalar) -> tuple[Quaternion, Matrix, Matrix]:
-    """How a body turns in a control period, and by what errors of attitude and bias are multiplied."""
+    """Return the rotation of a body in a control period, and the transition matrices of the errors of attitude and bias."""
     turn = short_turn(scale(0.5 * period, rate))
     axes = from_quaternion(turn)
     # d(error)/dt = -w x error - error of the bias, over the period.

@@ -16,7 +16,7 @@ from starhold.algebra.words import number_of
 from starhold.parts.epoch import Date, date_text, days_of, sidereal, spun, turned
 
 SOURCE = "International Geomagnetic Reference Field, 14th generation (2024)"
-"""For the cards of parts that take it."""
+"""Source on the cards of parts that use the field."""
 ASSUMPTIONS = (
     "internal field up to degree and order 8: with storms and currents outside the Earth left out",
     "inertial axes of the equator and equinox of date",
@@ -26,9 +26,9 @@ RADIUS = 6.3712e6
 GROUND = 6.35e6
 """A distance (m) from the Earth's centre that is below ground everywhere."""
 FIRST, LAST = (days_of((year, 1.0, 1.0, 0.0, 0.0, 0.0)) for year in (2025.0, 2030.0))
-"""Days since J2000 that the coefficients are for."""
+"""Range of validity of the coefficients, in days since J2000."""
 GRID = radians(2.0)
-"""The angle between places at which the field is measured for a bound of its strength."""
+"""The angle between points at which the field is computed for a bound on its strength."""
 Row: TypeAlias = tuple[int, int, float, float, float, float]
 ROWS: tuple[Row, ...] = (
     (1, 0, -29350.0, 0.0, 12.6, 0.0),
@@ -76,12 +76,12 @@ ROWS: tuple[Row, ...] = (
     (8, 7, -16.8, -5.2, 0.0, 0.3),
     (8, 8, 1.0, 3.9, 0.3, 0.2),
 )
-"""Degree, order, Gauss coefficients g and h at 2025.0 (nT), and their changes in a year (nT): facts of IGRF-14."""
+"""Degree, order, Gauss coefficients g and h at 2025.0 (nT), and their changes per year (nT), of IGRF-14."""
 
 
 class Numbers(NamedTuple):
-    """The equation takes for each order the coefficients of cosine and sine (T), by degree, scaled for its recursion, the
-    turns of the Earth at the start, and the control period (s)."""
+    """For each order, the coefficients of cosine and sine (T) by degree, scaled for the recursion; the Earth's rotation
+    angle at the start (turns), and the control period (s)."""
 
     cosines: tuple[tuple[Scalar, ...], ...]
     sines: tuple[tuple[Scalar, ...], ...]
@@ -89,19 +89,19 @@ class Numbers(NamedTuple):
     period: Scalar
 
     IN_COMMON = True  # pyright: ignore
-    """Kernels take equal numbers of this kind for one argument."""
+    """Kernels merge equal numbers of this kind into one argument."""
 
 
 def prepared(epoch: Date, period: float = 1.0, rows: tuple[Row, ...] = ROWS) -> Numbers:
-    """The numbers of the field for a flight that begins at an epoch (UTC), during which the coefficients are constant.
-    period: the control period (s), for `field_at`.
+    """Return the numbers of the field for a flight that begins at an epoch (UTC), during which the coefficients are
+    constant. period: the control period (s), for `field_at`.
 
-    ValueError for an epoch that is no date, or not from 2025 to 2030."""
+    Raise ValueError for an epoch that is no date, or not from 2025 to 2030."""
     days = _known(epoch)
     highest = max(row[0] for row in rows)
     pairs = [[(0.0, 0.0) for _ in range(max(m, 1), highest + 1)] for m in range(highest + 1)]
     for n, m, g, h in _at(days, rows):
-        # From Schmidt's normalisation to none, in T; (n - m)! makes one factor of all that the gradient needs.
+        # From Schmidt normalisation to none, in T; (n - m)! collects the factors that the gradient needs.
         size = 1e-9 * sqrt((2.0 if m else 1.0) * factorial(n - m) / factorial(n + m)) / factorial(n - m)
         pairs[m][n - max(m, 1)] = (size * g, size * h)
     cosines, sines = (tuple(tuple(pair[k] for pair in order) for order in pairs) for k in (0, 1))
@@ -110,12 +110,12 @@ def prepared(epoch: Date, period: float = 1.0, rows: tuple[Row, ...] = ROWS) -> 
 
 @cache
 def strongest(epoch: Date, distance: float) -> float:
-    """A bound of the field's strength (T) from a distance (m) from the Earth's centre on, at an epoch (UTC).
+    """Return a bound on the field's strength (T) from a distance (m) from the Earth's centre on, at an epoch (UTC).
 
-    Farther away the strength is nowhere more than the largest on this sphere, for it is subharmonic. On a great circle
-    through the place of the largest, the field's part along it is a trigonometric polynomial, of one degree more than the
-    harmonics, and within an angle a of its maximum no less than cos(degree a) of that (Riesz), so that a grid tells. Errors
-    as of `prepared`.
+    Farther away the strength is nowhere more than the largest on this sphere, because it is subharmonic. On a great circle
+    through the point of the maximum, the field's component along it is a trigonometric polynomial, of one degree more than
+    the harmonics, and within an angle a of its maximum at least cos(degree a) of that (Riesz), so a grid suffices. Errors
+    as in `prepared`.
     """
     import numpy as np
 
@@ -141,7 +141,7 @@ def strongest(epoch: Date, distance: float) -> float:
 
 
 def _known(epoch: Date) -> float:
-    """The days since J2000. ValueError for an epoch that is no date, or beyond the coefficients."""
+    """Return the days since J2000. Raise ValueError for an epoch that is no date, or beyond the coefficients."""
     days = days_of(epoch)
     if not FIRST <= days <= LAST:
         raise ValueError(f"the magnetic field is known from 2025 to 2030, not at the epoch {date_text(epoch)}")
@@ -149,35 +149,35 @@ def _known(epoch: Date) -> float:
 
 
 def _at(days: float, rows: tuple[Row, ...]) -> Iterator[tuple[int, int, float, float]]:
-    """Degree, order and coefficients (nT) at this many days after J2000."""
+    """Return degree, order and coefficients (nT) at this many days after J2000."""
     years = 5.0 * (days - FIRST) / (LAST - FIRST)
     for n, m, g, h, g_change, h_change in rows:
         yield n, m, g + years * g_change, h + years * h_change
 
 
 def field(position: Vector, time: Scalar, params: Numbers) -> Vector:
-    """The magnetic field (T) at a position (m) and a time (s) after the start, both in inertial axes; not defined at the
-    centre."""
+    """Return the magnetic field (T) at a position (m) and a time (s) after the start, both in inertial axes; not defined at
+    the centre."""
     cosine, sine = cosine_sine(turned(params.turn, time))
     return spun(earth_fixed(spun(position, cosine, -sine), params), cosine, sine)
 
 
 def field_at(position: Vector, step: Any, params: Numbers) -> Vector:
-    """The magnetic field (T) at a position (m) as a control step begins, both in inertial axes. A kernel computes it
-    once for all parts that need it at one place."""
+    """Return the magnetic field (T) at a position (m) at the start of a control step, both in inertial axes. A kernel
+    computes it once for all parts that need it at the same position."""
     return field(position, number_of(step) * params.period, params)
 
 
 def earth_fixed(position: Vector, params: Numbers) -> Vector:
-    """The magnetic field (T) at a position (m), both in axes of the Earth: minus the gradient of the potential.
+    """Return the magnetic field (T) at a position (m), both in Earth-fixed axes: minus the gradient of the potential.
 
-    The harmonics are those of Cunningham, made of x, y, z alone, so that no angle is needed and the poles are no
-    exception (Montenbruck and Gill, Satellite Orbits, 3.2.4)."""
+    The harmonics are Cunningham's, functions of x, y, z alone, so no angles are needed and the poles are regular
+    (Montenbruck and Gill, Satellite Orbits, 3.2.4)."""
     highest = len(params.cosines) - 1
     inverse_square = 1.0 / dot(position, position)
     x, y, z = scale(RADIUS * inverse_square, position)
     square = RADIUS * RADIUS * inverse_square
-    # Powers of x + i y, and the factors that go with them.
+    # Powers of x + i y, and their factors.
     powers: list[tuple[Scalar, Scalar]] = [(1.0, 0.0)]
     begins: list[Scalar] = [root(square)]
     for m in range(highest + 1):
@@ -196,7 +196,7 @@ def earth_fixed(position: Vector, params: Numbers) -> Vector:
         harmonics.append(each(_higher, (rising, falling, last, harmonics[-2][: len(rising)]), z, square))
 
     def along(order: int) -> Scalar:
-        """The sum over degrees of the weights of order 0 times the harmonics of one degree more, of an order."""
+        """Return the sum over degrees of the weights of order 0 times the harmonics of `order` and the next degree."""
         weights = params.cosines[0]
         return reduce(plus, (weights[j] * harmonics[j + 2 - order][order] for j in range(highest)))
 
@@ -208,7 +208,8 @@ def earth_fixed(position: Vector, params: Numbers) -> Vector:
         [(g, h, harmonics[j][m + 1], harmonics[j + 2][m - 1], harmonics[j + 1][m]) for j, (g, h) in enumerate(pairs)]
         for m, pairs in zip(orders, weights, strict=True)
     ]
-    # Sums over degrees of an order's weights times the harmonics of one degree more, of the next order, the last and it.
+    # Sums over degrees of an order's weights times the harmonics of the next degree, of the next, the previous and this
+    # order.
     for m, sums in zip(orders, folded(_begun, _further, rows), strict=True):
         terms = _gradient(sums, powers[m + 1], powers[m - 1], powers[m])
         east, north, up = east + terms[0], north + terms[1], up + terms[2]
@@ -232,7 +233,7 @@ def _further(sums: tuple[Scalar, ...], *columns: Scalar) -> tuple[Scalar, ...]:
 
 
 def _gradient(sums: tuple[Scalar, ...], *circles: tuple[Scalar, Scalar]) -> Vector:
-    """Return what an order adds to the field."""
+    """Return the contribution of an order to the field."""
     outer_g, outer_h, inner_g, inner_h, here_g, here_h = sums
     (c, s), (below_c, below_s), (here_c, here_s) = circles
     return (

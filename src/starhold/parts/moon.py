@@ -1,4 +1,4 @@
-"""The Moon: its place over time."""
+"""The Moon's position over time."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ ASSUMPTIONS = (
 )
 EARTH = BODIES["Earth"].radius
 CENTURY, LATE = 36525.0, 69.2
-"""Days in a Julian century, and by how many seconds Terrestrial Time is ahead of UTC."""
+"""Days in a Julian century, and the lead of Terrestrial Time over UTC (s)."""
 _MEAN = (218.32, 481267.881)
-# Degrees; and the degrees at J2000 and in a century of each term's angle.
+# Amplitude (deg), and each term's angle at J2000 (deg) and its rate (deg per century).
 _LONGITUDE = (
     (6.29, 135.0, 477198.87),
     (-1.27, 259.3, -413335.36),
@@ -31,12 +31,12 @@ _LONGITUDE = (
 )
 _LATITUDE = ((5.13, 93.3, 483202.02), (0.28, 228.2, 960400.89), (-0.28, 318.3, 6003.15), (-0.17, 217.6, -407332.21))
 _PARALLAX = (0.0518, 0.0095, 0.0078, 0.0028)
-"""The parallax has these cosines of the longitude's first angles (deg), beside 0.9508 deg."""
+"""Coefficients (deg) of the cosines of the longitude's first angles in the parallax, in addition to 0.9508 deg."""
 
 
 class Almanac(NamedTuple):
-    """At the start the mean longitude and the angles of the terms of longitude and latitude (turns), and cosine and sine of
-    the equator's slope."""
+    """The Moon at the start: mean longitude and angles of the terms of longitude and latitude (turns), and cosine and sine
+    of the obliquity."""
 
     mean: Scalar
     longitude: tuple[Scalar, ...]
@@ -49,8 +49,8 @@ Numbers: TypeAlias = Almanac | series.Lunar
 
 
 def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
-    """The numbers of the Moon for a flight that begins at an epoch (UTC), by the almanac's formulas or by precise series;
-    ValueError for one that is no date."""
+    """Return the numbers of the Moon for a flight that begins at an epoch (UTC), by the almanac's formulas or by precise
+    series. Raise ValueError for an epoch that is no date."""
     if ephemeris:
         return series.lunar(epoch)
     days = days_of(epoch)
@@ -65,7 +65,7 @@ def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
 
 
 def position(time: Scalar, params: Numbers) -> Vector:
-    """The Moon's place (m, inertial axes, from the Earth's centre) at a time (s) after the start."""
+    """Return the Moon's position (m, inertial axes, from the Earth's centre) at a time (s) after the start."""
     if isinstance(params, series.Lunar):
         return series.moon_at(time, params)
 
@@ -78,7 +78,7 @@ def position(time: Scalar, params: Numbers) -> Vector:
     x, y = cosine_sine(angle(params.mean, _MEAN[1]) + ahead)
     level, north = cosine_sine(sum(term[0] / 360.0 * s for term, (_, s) in zip(_LATITUDE, across, strict=True)))
     parallax = 0.9508 + sum(size * c for size, (c, _) in zip(_PARALLAX, along, strict=False))
-    # Angles of a degree are their sines to 5e-5.
+    # Angles of about a degree equal their sines to 5e-5.
     distance = EARTH / (radians(1.0) * parallax)
     x, y = distance * (level * x), level * y
     return (

@@ -1,5 +1,5 @@
-"""Two-body orbits: from Keplerian elements to position and velocity, the lowest point of an orbit, and when it meets a
-surface; the bodies that are orbited."""
+"""Two-body orbits: Keplerian elements to position and velocity, the extreme distances of an orbit, and its intersection
+with a surface; central bodies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from starhold.algebra.vector import Vector
 
 
 class Body(NamedTuple):
-    """A body to orbit: gravitational parameter GM (m3/s2) and equatorial radius (m)."""
+    """A central body: gravitational parameter GM (m3/s2) and equatorial radius (m)."""
 
     gravity: float
     radius: float
@@ -28,8 +28,8 @@ BODIES: dict[str, Body] = {
     "Uranus": Body(5.7945564e15, 2.5559e7),
     "Neptune": Body(6.83652710058e15, 2.4764e7),
 }
-"""By name. GM from the ephemeris DE440 (Park et al. 2021), equatorial radii of the IAU (Archinal et al. 2018), the Earth's
-of WGS 84."""
+"""Central bodies by name. GM from the ephemeris DE440 (Park et al. 2021), equatorial radii of the IAU (Archinal et al.
+2018), the Earth's of WGS 84."""
 ALIKE = 0.01
 """The relative difference up to which a gravitational parameter is recognised as that of a known body."""
 NEWTON = 6.6743e-11
@@ -37,7 +37,7 @@ NEWTON = 6.6743e-11
 
 
 def body_of(gravity: float) -> str | None:
-    """The name of the body with this gravitational parameter (m3/s2), None for one that is not known."""
+    """Return the name of the body with this gravitational parameter (m3/s2), None if it is not known."""
     return next((name for name, body in BODIES.items() if abs(gravity / body.gravity - 1.0) < ALIKE), None)
 
 
@@ -54,10 +54,10 @@ class Elements(NamedTuple):
 
 
 def from_elements(elements: Elements, gravity: float) -> tuple[Vector, Vector]:
-    """Position (m) and velocity (m/s) in inertial axes, third axis along the pole (Vallado, Fundamentals of Astrodynamics
-    and Applications, algorithm COE2RV).
+    """Return position (m) and velocity (m/s) in inertial axes, third axis along the pole (Vallado, Fundamentals of
+    Astrodynamics and Applications, algorithm COE2RV).
 
-    ValueError where the semi-major axis does not fit the eccentricity, or a hyperbola has no such true anomaly."""
+    Raise ValueError if the semi-major axis does not fit the eccentricity, or a hyperbola has no such true anomaly."""
     a, e, i, node, periapsis, anomaly = elements
     if e == 1.0 or a * (1.0 - e) <= 0.0:
         raise ValueError("a positive semi-major axis for an eccentricity below 1, a negative one above")
@@ -68,7 +68,7 @@ def from_elements(elements: Elements, gravity: float) -> tuple[Vector, Vector]:
     angle = periapsis + anomaly
     along, across = math.cos(angle), math.sin(angle)
     onward = -(math.sin(angle) + e * math.sin(periapsis)), math.cos(angle) + e * math.cos(periapsis)
-    # Axes of the plane of the orbit: towards the ascending node, and a quarter turn on.
+    # Axes in the plane of the orbit: towards the ascending node, and a quarter turn ahead.
     ascent = math.cos(node), math.sin(node), 0.0
     quarter = -math.sin(node) * math.cos(i), math.cos(node) * math.cos(i), math.sin(i)
 
@@ -80,38 +80,38 @@ def from_elements(elements: Elements, gravity: float) -> tuple[Vector, Vector]:
 
 
 def lowest(position: Vector, velocity: Vector, gravity: float) -> float:
-    """The least distance (m) of the whole orbit from the centre."""
+    """Return the least distance (m) of the orbit from the centre."""
     distance, parameter, eccentricity = _conic(position, velocity, gravity)
     return min(distance, parameter / (1.0 + eccentricity))
 
 
 def highest(position: Vector, velocity: Vector, gravity: float) -> float:
-    """The largest distance (m) of the whole orbit from the centre; infinity for one that does not come back."""
+    """Return the largest distance (m) of the orbit from the centre; infinity for an unbound orbit."""
     distance, parameter, eccentricity = _conic(position, velocity, gravity)
     return max(distance, parameter / (1.0 - eccentricity)) if eccentricity < 1.0 else math.inf
 
 
 def angular_momentum(position: Vector, velocity: Vector) -> float:
-    """The norm of the angular momentum per mass (m2/s)."""
+    """Return the norm of the specific angular momentum (m2/s)."""
     return math.sqrt(_invariants(position, velocity, 0.0)[3])
 
 
 def period_of(position: Vector, velocity: Vector, gravity: float) -> float:
-    """How long (s) an orbit takes; infinity for one that does not come back."""
+    """Return the period (s) of an orbit; infinity for an unbound orbit."""
     energy = _invariants(position, velocity, gravity)[1]
     return math.tau * gravity / math.sqrt((-2.0 * energy) ** 3) if energy < 0.0 else math.inf
 
 
 def highest_speed(position: Vector, velocity: Vector, gravity: float) -> float:
-    """The largest speed (m/s) of the whole orbit, at its lowest point."""
+    """Return the largest speed (m/s) of the orbit, which is at periapsis."""
     energy = _invariants(position, velocity, gravity)[1]
     nearest = lowest(position, velocity, gravity)
     return math.sqrt(max(2.0 * (energy + gravity / nearest), math.hypot(*velocity) ** 2))
 
 
 def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) -> float:
-    """When (s) the motion first comes down to this distance (m) from the centre, infinity if never. The motion starts beyond
-    it."""
+    """Return the time (s) at which the motion first descends to this distance (m) from the centre, infinity if never. The
+    motion starts above it."""
     distance, energy, radial, _ = _invariants(position, velocity, gravity)
     if lowest(position, velocity, gravity) >= radius:
         return math.inf
@@ -136,7 +136,7 @@ def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) 
 
 
 def at_anomaly(position: Vector, velocity: Vector, gravity: float, anomaly: float) -> tuple[Vector, Vector]:
-    """Position (m) and velocity (m/s) where the orbit is by so much (rad) of true anomaly ahead of a position."""
+    """Return position (m) and velocity (m/s) on the orbit at a true anomaly `anomaly` (rad) ahead of a position."""
     distance, _, radial, h2 = _invariants(position, velocity, gravity)
     c, s, parameter, h = math.cos(anomaly), math.sin(anomaly), h2 / gravity, math.sqrt(h2)
     e_c, e_s = parameter / distance - 1.0, h * radial / (gravity * distance)
@@ -153,15 +153,15 @@ def at_anomaly(position: Vector, velocity: Vector, gravity: float, anomaly: floa
 
 
 def _conic(position: Vector, velocity: Vector, gravity: float) -> tuple[float, float, float]:
-    """Distance (m), parameter (m) and eccentricity."""
+    """Return distance (m), semi-latus rectum (m) and eccentricity."""
     distance, _, radial, h2 = _invariants(position, velocity, gravity)
     parameter = h2 / gravity
-    # e cos(anomaly) and e sin(anomaly): of near circles the energy would lose the eccentricity.
+    # From e cos(anomaly) and e sin(anomaly): for nearly circular orbits the energy would lose the eccentricity in rounding.
     return distance, parameter, math.hypot(parameter / distance - 1.0, math.sqrt(parameter / gravity) * radial / distance)
 
 
 def _invariants(position: Vector, velocity: Vector, gravity: float) -> tuple[float, float, float, float]:
-    """Distance, energy per mass, position times velocity, and the square of the angular momentum per mass."""
+    """Return distance, specific energy, position times velocity, and the square of the specific angular momentum."""
     distance = math.hypot(*position)
     radial = sum(r * v for r, v in zip(position, velocity, strict=True))
     x, y, z = position

@@ -1,4 +1,4 @@
-"""Times at which a sensor gives nothing new, for sensors that declare them: an outage, and those between its updates."""
+"""Times without new readings, for sensors that declare them: an outage, and the intervals between updates."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from starhold.algebra.words import number_of
 from starhold.parts.contract import Parameter
 
 Window: TypeAlias = tuple[Scalar, Scalar]
-OUTAGE = Parameter("s", shape=(2,), spread=False, at_least=0.0, text="begin and end without readings; none if equal")
+OUTAGE = Parameter("s", shape=(2,), spread=False, at_least=0.0, text="begin and end of an outage; none if equal")
 """The declaration of outages, common to all sensors."""
 NEVER: Window = (0.0, 0.0)
 INTERVAL = Parameter("s", at_least=0.0, plain=(300.0, "ms"), text="between updates; each control step if 0")
 """The declaration of the time from update to update, common to all sensors."""
 Silence: TypeAlias = tuple[Scalar, ...]
-"""Begin and end of an outage in control steps, and where they are more than one those from update to update."""
+"""Begin and end of an outage in control steps, and the control steps from update to update if they are more than one."""
 
 
 def in_steps(outage: Window, period: float, interval: float = 0.0) -> Silence:
-    """The outage, and the interval (s), in control steps. ValueError where the outage ends before it begins."""
+    """Return the outage and the interval in control steps. Raise ValueError if the outage ends before it begins."""
     begin, end = outage
     if end < begin:
         raise ValueError(f"the outage ends at {end:g} s, before it begins at {begin:g} s")

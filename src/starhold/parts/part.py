@@ -1,5 +1,4 @@
-"""Parts of a loop as objects, whatever their role: a part file under its name, and a part with the numbers it has in a
-loop."""
+"""Parts of a loop in any role as objects: a part file under its name, and a part with its parameters in a loop."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from starhold.parts.contract import Card, Field, NoMemory, fields
 
 @dataclass(frozen=True)
 class Part:
-    """A part file as an object; its name is the file's, with hyphens."""
+    """A part file as an object; its name is that of the file, with hyphens."""
 
     name: str
     module: ModuleType
@@ -41,27 +40,27 @@ class Part:
 
     @property
     def table(self) -> str:
-        """The table of a scenario that gives it; "" for one that is given by a [[part]] table."""
+        """The table of a scenario for this part; "" if that is a [[part]] table."""
         return getattr(self.module, "TABLE", "")
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Other parts of the loop, or readings, that it cannot do without, by name; `Fitted.needs` for its numbers."""
+        """Names of other parts of the loop, or readings, that it needs; with parameters see `Fitted.needs`."""
         return getattr(self.module, "NEEDS", ())
 
     @property
     def about(self) -> str:
-        """The one body, by its name among `parts.orbit.BODIES`, that its orbit may be about; "" for any, `Fitted.about` for
-        its numbers."""
+        """The name in `parts.orbit.BODIES` of the only body that it may orbit; "" for any; with parameters see
+        `Fitted.about`."""
         return getattr(self.module, "ABOUT", "")
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """Readings, by name, that a law or an effector with `switch` cannot do without."""
+        """Names of readings that a law or an effector with `switch` needs."""
         return getattr(self.module, "READS", ())
 
     def is_known(self, name: str) -> bool:
-        """Whether laws, or flight software that shares their command out, compute with this parameter."""
+        """Return whether laws, or the flight software that distributes their command, use this parameter."""
         return self.flag("MODELLED") or name in getattr(self.module, "KNOWN", ())
 
     @property
@@ -74,23 +73,23 @@ class Part:
         return fields(self.params)
 
     def examples(self) -> list[Any]:
-        """Parameters that tests and docs run."""
+        """Return parameters for tests and docs."""
         return self.module.examples()
 
     def hook(self, name: str) -> Callable[..., Any] | None:
-        """An equation that parts of its role may define or leave out."""
+        """Return an optional equation of its role; None if it is not defined."""
         return getattr(self.module, name, None)
 
     def flag(self, name: str) -> bool:
-        """Whether it declares this flag, see `parts.roles`."""
+        """Return whether it declares this flag, see `parts.roles`."""
         return bool(getattr(self.module, name, False))
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A part in a loop: its parameters, the name that recordings and errors call it by, and the state that it starts
-    with (of effectors; None: the part's default). An estimator may watch: the law does not use it; and another one, of
-    the name `started_by`, may give it its first attitude."""
+    """A part in a loop: its parameters, its name in recordings and errors, and the initial state of an effector (None: the
+    part's default). An estimator may watch, unused by the law; and another one, named `started_by`, may give it its first
+    attitude."""
 
     part: Part
     params: Any = ()
@@ -111,23 +110,23 @@ class Fitted:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Other parts of the loop, or readings, that it cannot do without with its parameters, by name."""
+        """Names of other parts of the loop, or readings, that it needs with these parameters."""
         tell = self.part.hook("needs")
         return self.part.needs if tell is None else tell(self.params)
 
     @property
     def about(self) -> str:
-        """The one body that its orbit may be about with its parameters; "" for any."""
+        """The name of the only body that it may orbit with these parameters; "" for any."""
         tell = self.part.hook("about")
         return self.part.about if tell is None else tell(self.params)
 
     def prepared(self, period: float) -> Any:
-        """Its parameters as equations take them, for a control period (s)."""
+        """Return its parameters in the form that equations take, for a control period (s)."""
         make = self.part.hook("prepare")
         return self.params if make is None else make(self.params, period)
 
     def remembered(self, *about: Any) -> Any:
-        """Its memory, or an effector's state, at the start, made of its parameters and the arguments that its role adds."""
+        """Return its initial memory, or an effector's state, from its parameters and the arguments that its role adds."""
         if self.start is not None:
             return self.start
         make = self.part.hook("remember")
@@ -135,12 +134,12 @@ class Fitted:
 
     @property
     def fastest(self) -> float:
-        """The fastest rate (1/s) at which it settles by itself, which the integration must resolve; 0 for none."""
+        """Return the fastest rate (1/s) at which it settles by itself, which the integration must resolve; 0 for none."""
         tell = self.part.hook("fastest")
         return 0.0 if tell is None else tell(self.params)
 
 
 def same_numbers(one: Any, other: Any) -> bool:
-    """Whether two nested states hold the same numbers."""
+    """Return whether two nested states have the same numbers."""
     pairs = [*leaves(one)], [*leaves(other)]
     return len(pairs[0]) == len(pairs[1]) and all(map(np.array_equal, *pairs))

@@ -1,4 +1,4 @@
-"""A spacecraft as flat plates, for the torques of air and of sunlight."""
+"""A spacecraft as flat plates, for the torques of drag and sunlight."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ COLUMNS = ("area", "normal_x", "normal_y", "normal_z", "x", "y", "z")
 """The columns of a table of plates: area (m2), outward normal, and centre from the centre of mass (m), body axes."""
 TEXT = "areas, outward normals and centres from the centre of mass, body axes; no plate shades another"
 TOLERANCE = 1e-9
-"""A sine below which a plate counts as seen edge on."""
+"""The sine below which a plate counts as seen edge-on."""
 BOX = (
     (0.06, 1.0, 0.0, 0.0, 0.052, -0.01, 0.02),
     (0.06, -1.0, 0.0, 0.0, -0.048, -0.01, 0.02),
@@ -39,7 +39,7 @@ class Plates(NamedTuple):
 
 
 def plates_of(rows: Any) -> Plates:
-    """The plates of a table. ValueError for one without rows, a negative area or a normal without direction."""
+    """Return the plates of a table. Raise ValueError for no rows, a negative area or a normal without direction."""
     if not rows:
         raise ValueError("the table of plates needs a row")
     normals: list[Vector] = []
@@ -52,14 +52,14 @@ def plates_of(rows: Any) -> Plates:
 
 
 def constant(vector: Vector) -> Vector:
-    """Return a vector with its components of 0, 1 and -1 as whole numbers, which are constants of a kernel: many are, for
-    most plates lie along the axes, and `cosines` and `total` compute nothing with them."""
+    """Return a vector with components 0, 1 and -1 as integers, which are constants of a kernel: most plates lie along the
+    axes, and `cosines` and `total` do no arithmetic with such components."""
     x, y, z = (int(number) if number in (-1.0, 0.0, 1.0) else number for number in vector)
     return (x, y, z)
 
 
 def cosines(normals: Sequence[Vector], direction: Vector) -> tuple[Scalar, ...]:
-    """Return the cosines of the angles between normals and a direction, 0 for plates that it does not see."""
+    """Return the cosines of the angles between normals and a direction, 0 for plates facing away."""
     return tuple(maximum(_sum(normal, direction), 0.0) for normal in normals)
 
 
@@ -90,11 +90,11 @@ def largest_torque(
     mirrored: Sequence[Vector] = (),
     scattered: Sequence[Vector] = (),
 ) -> float:
-    """A bound (m3) of |s x sum c_i taken_i - sum c_i^2 mirrored_i - sum c_i scattered_i| over all unit vectors s, with c_i =
-    max(n_i.s, 0).
+    """Return a bound (m3) on |s x sum c_i taken_i - sum c_i^2 mirrored_i - sum c_i scattered_i| over all unit vectors s,
+    with c_i = max(n_i.s, 0).
 
-    While the same plates are seen the first sum is Ms, and |s x Ms| = |s x (M - x)s| is at most |M - x| for any number x.
-    The others are linear in s and in the products of its components.
+    For a fixed set of visible plates the first sum is Ms, and |s x Ms| = |s x (M - x)s| is at most |M - x| for any number
+    x. The others are linear in s and in the products of its components.
     """
     n = np.array(normals)
     first, second, third = (np.array(arms if len(arms) else np.zeros_like(n)) for arms in (taken, mirrored, scattered))
@@ -107,13 +107,13 @@ def largest_torque(
         arms = [float(np.linalg.norm(M - (low + (high - low) * k / 32.0) * np.eye(3), 2)) for k in range(33)]
         others = np.linalg.norm(third[seen].T @ faces, 2) + np.linalg.norm(second[seen].T @ squares[seen], 2)
         largest = max(largest, float(min(arms) + others))
-    # A little more, because plates seen nearly edge on may count as hidden.
+    # Slightly more, because plates seen nearly edge-on may count as hidden.
     return largest + TOLERANCE * float(sum(np.linalg.norm(arms, axis=1).sum() for arms in (first, second, third)))
 
 
 def sights(normals: NDArray[np.float64]) -> Iterator[NDArray[np.bool_]]:
-    """Yield which plates are seen at once, as (n,) of bool, for all directions to see them from: the cells that planes
-    across the normals cut space into, each of which has an edge where two planes meet, or is a half of space."""
+    """Yield the sets of plates visible at once, as (n,) of bool, for all directions: the cells into which the planes normal
+    to the plates' normals divide space, each of which has an edge where two planes meet, or is a half-space."""
     across = [np.cross(*pair) for pair in combinations(normals, 2)]
     edges = [unit / size for unit in across if (size := np.linalg.norm(unit)) > TOLERANCE]
     patterns = {tuple(normals @ side > 0.0) for side in (normals[0], -normals[0])} if not edges else set[tuple[bool, ...]]()

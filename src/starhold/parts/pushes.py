@@ -1,4 +1,4 @@
-"""Forces that move the orbit, for parts that are set to apply them: what parts declare for it, and what they share."""
+"""Forces that move the orbit: the parameters that parts declare for them, and shared functions."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ MASS = Parameter(
 
 
 def inverse_mass(moves_orbit: int, mass: float) -> Any:
-    """One over the mass (1/kg) for a part that moves the orbit, None for another. ValueError where the mass is missing."""
+    """Return one over the mass (1/kg) for a part that moves the orbit, else None. Raise ValueError without a mass."""
     if isinstance(mass, float) and math.isinf(mass) and moves_orbit:
         raise ValueError("a force that moves the orbit needs the spacecraft's mass: mass in [spacecraft]")
     return 1.0 / mass if moves_orbit else None
 
 
 def moves(params: Any) -> bool:
-    """Whether a part with these parameters moves the orbit by its force."""
+    """Return whether a part with these parameters moves the orbit by its force."""
     return bool(getattr(params, "moves_orbit", 0))

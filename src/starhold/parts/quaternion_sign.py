@@ -1,7 +1,7 @@
 """Chooses which of the two quaternions of an attitude a law receives: q and -q are the same attitude, but not the same
 feedback.
 
-Each function takes the error attitude, the memory h = +-1 and the hysteresis half-width, and gives the attitude to feed
+Each function takes the error attitude, the memory h = +-1 and the hysteresis half-width, and returns the attitude to feed
 back and the new memory.
 """
 

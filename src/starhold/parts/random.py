@@ -1,9 +1,9 @@
-"""Random numbers are a function of (seed, run, step, number): no stream, so nothing depends on scheduling.
+"""Random numbers as a function of (seed, run, step, number): there is no stream, so nothing depends on scheduling.
 
-The bits are Threefry-2x64 with 20 rounds ("Parallel Random Numbers: As Easy as 1, 2, 3"). Each call gives two words,
-and these two Gaussians by the transform of Box and Muller, made of `+ - * /`, a square root and operations on words
-only, so that floats, every lane and exported code round alike. The results differ from the exact transform of the same
-words by less than 9e-14 of the number.
+The bits are Threefry-2x64 with 20 rounds ("Parallel Random Numbers: As Easy as 1, 2, 3"). Each call gives two words, and
+from these two Gaussians by the Box-Muller transform, which uses only `+ - * /`, a square root and operations on words, so
+that floats, every lane and exported code round alike. The relative difference from the exact transform of the same words is
+below 9e-14.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Word: TypeAlias = Any
 _PARITY = 0x1BD11BDAA9FC1A22
 _ROTATIONS = (16, 42, 12, 31, 16, 32, 24, 21)
 _SIGN, _ONE, _FRACTION = 1 << 63, 0x3FF << 52, (1 << 52) - 1
-"""Bits of -0.0, of 1.0, and those of a double's fraction."""
+"""Bits of -0.0, of 1.0, and of a double's fraction."""
 _ROOT = 0x3FE6A09E667F3BCD
 """Bits of the square root of 1/2."""
 
@@ -65,9 +65,9 @@ _SINE = (
 
 
 def threefry(key: tuple[Word, Word], *counters: tuple[Word, Word]) -> tuple[tuple[Word, Word], ...]:
-    """Two 64-bit words that look random of each counter, a bijection of it for each key.
+    """Return two pseudo-random 64-bit words for each counter, a bijection of it for each key.
 
-    Each round waits for the one before, so the counters go through it together."""
+    Each round waits for the one before, so all counters are processed together."""
     k0, k1 = map(_word, key)
     keys = (k0, k1, word_xor(word_xor(k0, k1), _PARITY))
     pairs = [(word_add(_word(c0), k0), word_add(_word(c1), k1)) for c0, c1 in counters]
@@ -76,7 +76,7 @@ def threefry(key: tuple[Word, Word], *counters: tuple[Word, Word]) -> tuple[tupl
         pairs = [(a, word_xor(rotate_left(b, _ROTATIONS[i % 8]), a)) for a, (_, b) in zip(sums, pairs, strict=True)]
         if i % 4 == 3:
             j = i // 4 + 1
-            # The sum in brackets is the same at every step.
+            # The sum in parentheses is the same at every step.
             pairs = [(word_add(a, keys[j % 3]), word_add(b, word_add(keys[(j + 1) % 3], j))) for a, b in pairs]
     return tuple(pairs)
 
@@ -86,29 +86,29 @@ def _word(word: Word) -> Word:
 
 
 def _one_to_two(word: Word) -> Scalar:
-    """1 + k 2^-52, k being the lowest 52 bits of a word; vector units convert no 64-bit integers."""
+    """Return 1 + k 2^-52, with k the lowest 52 bits of a word; vector units convert no 64-bit integers."""
     return with_bits(word_or(word_and(word, _FRACTION), _ONE))
 
 
 def to_unit(word: Word) -> Scalar:
-    """(k + 1/2) 2^-52 exactly, k being the lowest 52 bits of a word: strictly between 0 and 1."""
+    """Return (k + 1/2) 2^-52 exactly, with k the lowest 52 bits of a word: strictly between 0 and 1."""
     return _one_to_two(word) - (1.0 - 2.0**-53)
 
 
 def to_angle(word: Word) -> Scalar:
-    """k 2^-52 - 1/2 exactly, k being the lowest 52 bits of a word: an angle in quarters of a turn, within an eighth."""
+    """Return k 2^-52 - 1/2 exactly, with k the lowest 52 bits of a word: an angle in quarter turns, up to 1/2."""
     return _one_to_two(word) - 1.5
 
 
 def _series(c: tuple[float, ...], x: Scalar) -> Scalar:
-    """A polynomial of six terms, in pairs that need not wait for each other."""
+    """Return a polynomial of six terms, computed in independent pairs."""
     square = x * x
     return square * (square * (c[4] + c[5] * x) + (c[2] + c[3] * x)) + (c[0] + c[1] * x)
 
 
 def _reduced(x: Scalar) -> tuple[Scalar, Scalar]:
-    """e and (m - 1) / (m + 1) where x = m 2^e, sqrt(1/2) <= m < sqrt(2)."""
-    # Moved so that the bits of the exponent change where the fraction passes the square root.
+    """Return e and (m - 1) / (m + 1) where x = m 2^e, sqrt(1/2) <= m < sqrt(2)."""
+    # Shifted so that the bits of the exponent change where the fraction passes the square root.
     moved = word_add(bits_of(x), _ONE - _ROOT)
     m = with_bits(word_add(word_and(moved, _FRACTION), _ROOT))
     s = (m - 1.0) / (m + 1.0)
@@ -116,20 +116,20 @@ def _reduced(x: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def _joined(e: Scalar, s: Scalar) -> Scalar:
-    """-2 log(x) from its reduced form."""
+    """Return -2 log(x) from its reduced form."""
     return e * -1.3862943611198906 + s * _series(_LOGARITHM, s * s)
 
 
 def cosine_and_sine(x: Scalar) -> tuple[Scalar, Scalar]:
-    """cos(x pi / 2) and sin(x pi / 2) for -1/2 <= x <= 1/2, with relative errors below 7e-14 and 6e-15."""
+    """Return cos(x pi / 2) and sin(x pi / 2) for -1/2 <= x <= 1/2, with relative errors below 7e-14 and 6e-15."""
     square = x * x
     return _series(_COSINE, square), x * _series(_SINE, square)
 
 
 def transform(a: Word, b: Word) -> tuple[Scalar, Scalar]:
-    """Two independent Gaussians from two words: bits 0 to 51 of each, and the highest."""
+    """Return two independent Gaussians from two words, of which bits 0 to 51 and the highest are used."""
     unit, angle = to_unit(a), to_angle(b)
-    # The division begins first: the angle is computed while it lasts.
+    # The division begins first, and the angle is computed meanwhile.
     e, s = _reduced(unit)
     cosine, sine = cosine_and_sine(angle)
     radius = sqrt(_joined(e, s))
@@ -141,31 +141,32 @@ def transform(a: Word, b: Word) -> tuple[Scalar, Scalar]:
 
 
 def normals(key: tuple[Word, Word], step: Word, first: int, count: int) -> tuple[Scalar, ...]:
-    """The Gaussians with the numbers `first` to `first` + `count` - 1 of a step, independent of each other and of those of
-    any other step, run or seed; key: (seed, run). Each depends on its own number alone; 2 n and 2 n + 1 share a call."""
+    """Return the Gaussians with the numbers `first` to `first` + `count` - 1 of a step, independent of each other and of
+    those of any other step, run or seed; key: (seed, run). Each depends on its number alone; 2 n and 2 n + 1 share a
+    call."""
     words = threefry(key, *((step, call) for call in range(first // 2, (first + count + 1) // 2)))
     pairs = each(transform, tuple(zip(*words, strict=True)))
     return tuple(x for pair in pairs for x in pair)[first % 2 :][:count]
 
 
 class Dice:
-    """The random numbers of one part at one control step: functions of (seed, run, step, number), in a range of its own."""
+    """The random numbers of a part at a control step: functions of (seed, run, step, number), in the part's own range."""
 
     def __init__(self, key: tuple[Word, Word], step: Word, first: int) -> None:
         self._key, self._step, self._first = key, step, first
 
     def vector(self, place: int, deviation: Scalar) -> Vector:
-        """Three independent Gaussians of this standard deviation: the part's numbers `place` to `place` + 2."""
+        """Return three independent Gaussians of this standard deviation: the part's numbers `place` to `place` + 2."""
         return self.vectors(place, deviation)[0]
 
     def vectors(self, place: int, *deviations: Scalar) -> tuple[Vector, ...]:
-        """Vectors of these standard deviations: the part's numbers from `place` on, made in less time than one by one."""
+        """Return vectors of these standard deviations, the part's numbers from `place` on; faster than one by one."""
         numbers = self.normals(place, 3 * len(deviations))
         triples = zip(numbers[::3], numbers[1::3], numbers[2::3], strict=True)
         return tuple(map(scale, deviations, triples))
 
     def normals(self, place: int, count: int) -> tuple[Scalar, ...]:
-        """Independent standard Gaussians: the part's numbers from `place` on."""
+        """Return independent standard Gaussians: the part's numbers from `place` on."""
         return normals(self._key, self._step, self._first + place, count)
 
 
@@ -176,13 +177,13 @@ class Silent(Dice):
         super().__init__((0, 0), 0, 0)
 
     def vectors(self, place: int, *deviations: Scalar) -> tuple[Vector, ...]:
-        """Three zeros of each."""
+        """Return a zero vector for each."""
         return ((0.0, 0.0, 0.0),) * len(deviations)
 
     def normals(self, place: int, count: int) -> tuple[Scalar, ...]:
-        """So many zeros."""
+        """Return `count` zeros."""
         return (0.0,) * count
 
 
 RANGE = 64
-"""Random numbers that a part may use at a control step."""
+"""Number of random numbers that a part may use at a control step."""

@@ -20,25 +20,25 @@ ASSUMPTIONS = (
     "inertial axes of the equator and equinox of date",
 )
 SHADOW = "the Earth's shadow is that of a sphere without air, its edge straight across the Sun's disc"
-"""For the cards of parts that take it."""
+"""Assumption on the cards of parts that use the shadow."""
 UNIT = 1.495978707e11
 """The astronomical unit, m."""
 PRESSURE = 1361.0 / 299792458.0
 """The pressure of sunlight on an absorbing surface, at one astronomical unit, N/m2 (Kopp and Lean 2011)."""
 FASTEST, QUICKENING = 2.07e-7, 2e-15
-"""Bounds of the rate of the Sun's direction (rad/s), 1.0193 deg a day at the perihelion, and of that rate's derivative
-(rad/s2), by the almanac and by the series."""
+"""Bounds on the rate of the Sun's direction (rad/s), 1.0193 deg per day at the perihelion, and on that rate's derivative
+(rad/s2), for the almanac and the series."""
 STEEPEST = radians(23.45)
-"""No smaller than the angle of the ecliptic to the equator."""
+"""An upper bound on the obliquity of the ecliptic (rad)."""
 STRONGEST = PRESSURE / 0.983**2
 """This pressure at the perihelion, rounded up."""
 RADIUS, EARTH = BODIES["Sun"].radius, BODIES["Earth"].radius
-# Degrees at J2000, and in a day.
+# Degrees at J2000, and degrees per day.
 _LONGITUDE, _ANOMALY = (280.460, 0.9856474), (357.528, 0.9856003)
 
 
 class Almanac(NamedTuple):
-    """At the start the Sun's mean longitude and mean anomaly (turns), and cosine and sine of the equator's slope."""
+    """The Sun at the start: mean longitude and mean anomaly (turns), and cosine and sine of the obliquity."""
 
     longitude: Scalar
     anomaly: Scalar
@@ -57,9 +57,9 @@ class Sun(NamedTuple):
 
 
 def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
-    """The numbers of the Sun for a flight that begins at an epoch (UTC), by the almanac's formulas or by precise series.
+    """Return the numbers of the Sun for a flight that begins at an epoch (UTC), by the almanac or by precise series.
 
-    ValueError for an epoch that is no date, or not from 1950 to 2050."""
+    Raise ValueError for an epoch that is no date, or not from 1950 to 2050."""
     days = days_of(epoch)
     if not 1950.0 <= epoch[0] <= 2050.0:
         raise ValueError(f"the Sun's place is known from 1950 to 2050, not at the epoch {date_text(epoch)}")
@@ -71,7 +71,7 @@ def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
 
 
 def sun(time: Scalar, params: Numbers) -> Sun:
-    """The Sun at a time (s) after the start."""
+    """Return the Sun at a time (s) after the start."""
     if isinstance(params, series.Solar):
         return Sun(*series.sun_at(time, params))
     c, s = cosine_sine(params.anomaly + _ANOMALY[1] / (360.0 * DAY) * time)
@@ -83,40 +83,40 @@ def sun(time: Scalar, params: Numbers) -> Sun:
 
 
 def in_view(position: Vector, seen: Sun) -> Scalar:
-    """The share of the Sun's disc, from 0 to 1, that the Earth leaves in view at a position (m, inertial) outside it.
+    """Return the visible share of the Sun's disc, from 0 to 1, at a position (m, inertial) outside the Earth.
 
-    The Earth's edge is modelled as straight across the disc, which is small compared with it: up to geostationary height
-    that changes the share by less than 0.4 %."""
+    The Earth's edge is modelled as straight across the disc, which is much smaller: up to geostationary height this changes
+    the share by less than 0.4 %."""
     square = dot(position, position)
-    # In the form that the Earth's attraction has, so that a kernel computes it once.
+    # In the form used by the Earth's attraction, so that a kernel computes it once.
     inverse = sqrt(1.0 / square)
     # Cosine and sine of the angle between the Sun and the Earth's centre, and of the Earth's angular radius.
     toward = -inverse * dot(position, seen.direction)
     across = sqrt(maximum(1.0 - toward * toward, 0.0))
     half = EARTH * inverse
     open_sky = sqrt(maximum(1.0 - half * half, 0.0))
-    # How far the Sun's centre stands above the edge, in radii of its disc: angles that small are their sines.
+    # The height of the Sun's centre above the edge, in radii of its disc: such small angles equal their sines.
     height = (across * open_sky - toward * half) * (seen.distance * (UNIT / RADIUS))
     # The Sun's direction is that from the Earth's centre.
     height = height - (1.0 / RADIUS) * across * (square * inverse)
-    # Where the Sun is on the other side the sine of the distance from the edge means nothing.
+    # If the Sun is on the other side, the sine of the distance from the edge is meaningless.
     height = where(less(toward, 0.0), 1.0, clip(height, 1.0))
 
     def cut(_: Scalar) -> tuple[Scalar]:
         return (_of_disc(height),)
 
-    # A branch, for the edge is seldom seen.
+    # A branch, because the edge is rarely in view.
     (share,) = when(both(less(height, 1.0), less(-1.0, height)), cut, 0.0)
     return where(less(height, 1.0), share, 1.0)
 
 
 def _of_disc(height: Scalar) -> Scalar:
-    """The share of a disc above a straight edge, of the height of its centre above it in radii, from -1 to 1."""
+    """Return the share of a disc above a straight edge, for its centre's height above that in radii, from -1 to 1."""
     cosine = sqrt(maximum(1.0 - height * height, 0.0))
     arc = 0.5 * rotation_vector((cosine, height, 0.0, 0.0))[0]
     return 0.5 + (1.0 / pi) * (arc + height * cosine)
 
 
 def pressure(seen: Sun) -> Scalar:
-    """The pressure of sunlight on an absorbing surface, where the Earth does not hide it (N/m2)."""
+    """Return the pressure of sunlight on an absorbing surface, without shadow (N/m2)."""
     return PRESSURE / (seen.distance * seen.distance)

@@ -1,4 +1,4 @@
-"""Loops that differ only in numbers fly as batches, a vector of lanes at a time; each is recorded as by `fly`."""
+"""Flies loops that differ only in numbers as batches, a vector of lanes at a time; each is recorded as by `fly`."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -18,13 +18,13 @@ from starhold.simulation.lanes import RunningBatch, ThreadPool, stacked
 from starhold.trace.machine import aligned, widest
 
 FEW = 3
-"""Up to this many loops are flown one by one, which is faster than compiling a kernel for lanes."""
+"""Up to this many loops fly one by one, which is faster than compiling a kernel for lanes."""
 MOST = 2**26
-"""The most numbers in the samples of a vector of lanes; longer flights are flown one by one."""
+"""Most numbers in the samples of a vector of lanes; longer flights fly one by one."""
 
 
 class Flying(NamedTuple):
-    """A loop, its control steps, and the control steps a sample."""
+    """A loop, its number of control steps, and the control steps per sample."""
 
     loop: ClosedLoop
     steps: int
@@ -38,7 +38,7 @@ def fly_batched(
     progress: Progress | None = None,
 ) -> list[Any]:
     """Return the results of `use(number, samples, carry)` for each flight, in order, with the samples (number, sample) and
-    carry of `fly`, bit for bit. Loops of one form fly together, whatever their numbers; the others one by one."""
+    carry of `fly`, bit for bit. Loops of the same form fly together; the others one by one."""
     groups: dict[Any, list[int]] = {}
     for number, flight in enumerate(flights):
         groups.setdefault(kernel_key(flight), []).append(number)
@@ -93,7 +93,7 @@ def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[...
     if (steps // every + 1) * size * width > MOST:
         return _one_by_one(group, numbers, use)
     phases = [flight.loop.phases(steps) for flight in group]
-    # The form is that of all lanes, so that one kernel flies every block of them.
+    # The form is that of all lanes, so one kernel flies every block.
     whole = [Numbers.of(phase) for phase in stacked(phases)]
     kernels = [make_kernel(one, loop.composition(), width, loop.carry(), values, loop.substeps) for values in whole]
 
@@ -124,7 +124,7 @@ class _Vector:
         self.lost_row = places(self.like).lost_at
 
     def fly(self, numbers: Sequence[Numbers]) -> Callable[[int], tuple[NDArray[np.float64], Any]]:
-        """Fly to the end; return a function that gives samples and carry of a lane."""
+        """Fly to the end; return a function that returns the samples and the carry of a lane."""
         for place, values in enumerate(numbers):
             now = self.phases[0][place]
             for lane in range(self.width):
@@ -159,7 +159,7 @@ class _Vector:
         return memories | {"shared": arguments.shared, "tables": arguments.tables}
 
     def _some(self, kernel: Kernel, memories: Any, first: int, count: int) -> int:
-        """Fly up to `count` control steps from `first` on: to the next sample, or by whole groups between samples."""
+        """Fly up to `count` control steps from `first` on, to the next sample or by whole groups; return their number."""
         into = first % self.every
         if into or count < self.every:
             groups, each, place = 1, min(count, self.every - into), 0 if into == 0 else -1
@@ -173,11 +173,11 @@ Array = NDArray[np.float64]
 
 
 PIECES = 2
-"""Pieces of a batch for each thread; few, because each is called once a window."""
+"""Pieces of a batch per thread; few, because each is called once per window."""
 
 
 class Metered(NamedTuple):
-    """The results of flights: the final states of the lanes (numbers, lanes), their notes (numbers, lanes), and the notes of
+    """Results of flights: the final states of the lanes (numbers, lanes), their notes (numbers, lanes), and the notes of
     windows (windows, quantities, lanes)."""
 
     ends: Array
@@ -188,8 +188,8 @@ class Metered(NamedTuple):
 def windows_of(
     phases: Sequence[Phase], cuts: Sequence[int], late: int
 ) -> Iterator[tuple[int, list[tuple[Phase, int, int]]]]:
-    """Yield for each window that ends at one of the cuts which observer takes notes, and each phase's first control step
-    and their number there."""
+    """Yield for each window, which ends at a cut, the index of its observer, and for each phase in it the first control
+    step and the number of steps."""
     done = 0
     for cut in cuts:
         spans = ((phase, max(done, phase.first), min(cut, phase.last)) for phase in phases)
@@ -198,11 +198,11 @@ def windows_of(
 
 
 class Flights(NamedTuple):
-    """Lanes that fly through phases, from `carries` (numbers, lanes), see `carry_columns`, and what is noted of them.
+    """Lanes that fly through phases, from `carries` (numbers, lanes), see `carry_columns`, and the notes to take.
 
     observers: one before the control step `late` and one from it on; noted: notes before the flight (numbers, lanes); cuts:
-    control steps at which windows end, `late` among them unless it is 0, the last, which includes the last instant, at the
-    end of the flight or after it; rows: notes that restart at 0 in each window."""
+    control steps at which windows end, including `late` unless it is 0; the last window includes the last instant, and ends
+    with the flight or after it; rows: notes that restart at 0 in each window."""
 
     loop: ClosedLoop
     carries: Array
@@ -216,8 +216,8 @@ class Flights(NamedTuple):
 
 
 def begin_metered(pool: ThreadPool, flights: Flights) -> Callable[..., Metered]:
-    """Begin to fly lanes, noting also the instant after the last step, whose command does not fly. Return a function that
-    waits for the end and reports progress."""
+    """Start to fly lanes, and note also the instant after the last step, whose command has no effect. Return a function
+    that waits for the end and reports progress."""
     loop, carries, phases, first_run, observers, noted, cuts, late, rows = flights
     batch = RunningBatch(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
     for phase in phases:

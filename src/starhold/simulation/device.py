@@ -1,4 +1,4 @@
-"""Lanes fly on a GPU as they fly here, metrics included: only numbers before and after a flight are copied."""
+"""Flies lanes on a GPU, metrics included: only numbers before and after a flight are copied."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from starhold.trace.device import Device, Rows
 
 Array = NDArray[np.float64]
 Pool: TypeAlias = ThreadPool | Device
-"""A pool flies blocks of runs: threads of this process, or a GPU."""
+"""A pool that flies blocks of runs: threads of this process, or a GPU."""
 
 
 class DeviceBatch:
-    """Lanes in flight on a GPU: the carry of each, and the observers' notes on it. Arguments as those of `RunningBatch`."""
+    """Lanes in flight on a GPU: the carry of each, and the observers' notes on it. Arguments as for `RunningBatch`."""
 
     def __init__(
         self, device: Device, loop: ClosedLoop, carries: Array, first_run: int | NDArray[np.int64], noted: Array
@@ -33,7 +33,7 @@ class DeviceBatch:
         self._ready: dict[tuple[int, int], Any] = {}
 
     def fly(self, phase: Phase, first: int, count: int, observer: Observer) -> None:
-        """Begin to fly `count` control steps of a phase from `first` on."""
+        """Start to fly `count` control steps of a phase from `first` on."""
         program, memories = self._prepared(phase, observer)
         if phase.jumps and first == phase.first:
             rows = [*places(self.loop.carry()).state.rate]
@@ -53,13 +53,13 @@ class DeviceBatch:
             given = {"shared": arguments.shared, "tables": arguments.tables, "common": np.empty(0)}
             memories = {name: self.device.rows(values.reshape(-1, 1)) for name, values in given.items()}
             memories |= {"carry": self.carry, "noted": self.noted, "own": self.device.rows(arguments.rows(self.lanes))}
-            # The key's objects are kept, so that no others get their ids.
+            # The objects in the key are kept alive, so that no others get their ids.
             self._ready[key] = (phase, observer), program, memories
         return self._ready[key][1:]
 
 
 def begin_on_device(device: Device, flights: Flights) -> Callable[..., Metered]:
-    """Begin to fly lanes on a GPU; the results are those of `begin_metered`, to the last bit."""
+    """Start to fly lanes on a GPU; the results have the same bits as those of `begin_metered`."""
     loop, carries, phases, first_run, observers, noted, cuts, late, rows = flights
     batch = DeviceBatch(device, loop, carries, first_run, noted)
     lanes, size = batch.lanes, 8 * batch.lanes
@@ -69,7 +69,7 @@ def begin_on_device(device: Device, flights: Flights) -> Callable[..., Metered]:
         for phase, first, count in legs:
             batch.fly(phase, first, count, observers[place])
         if window == len(cuts) - 1:
-            # The command of the last instant is noted and does not fly.
+            # The command of the last instant is noted but has no effect.
             device.call("cuMemcpyDtoD", ends.address, batch.carry.address, ends.size)
             batch.fly(phases[-1], phases[-1].last, 1, observers[1])
         for k, row in enumerate(rows):

@@ -32,11 +32,11 @@ PULSE = 0.1
 """Seconds of work between two reports of progress."""
 
 IN_MEMORY = 2**28
-"""The most bytes of samples that are kept in memory; more go to a temporary file."""
+"""Most bytes of samples kept in memory; more go to a temporary file."""
 
 
 class Variable(NamedTuple):
-    """Names of the dimensions, values, and attributes such as the unit."""
+    """A recorded variable: names of its dimensions, values, and attributes such as the unit."""
 
     dimensions: tuple[str, ...]
     data: Any
@@ -60,7 +60,7 @@ class Recording:
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Recording:
-        """Return the recording of a Dataset from `dataset`. ValueError for one that is not a run."""
+        """Return the recording of a Dataset from `dataset`. Raise ValueError if it is not a run."""
         if not {"body", "control_period", "record_every"} <= set(dataset.attrs) or "time" not in dataset:
             raise ValueError("not a run; give a Dataset of `simulate`, or of a run.nc")
         arrays = {str(name): dataset[name].to_numpy() for name in ("time", *dataset.data_vars)}
@@ -77,7 +77,7 @@ class Recording:
 
     def dataset(self) -> xr.Dataset:
         """Return the recording as a Dataset with units."""
-        # Loaded here, because it takes longer than most flights, and measuring and drawing do not need it.
+        # Loaded here, because loading takes longer than most flights, and metrics and figures do not need it.
         import xarray as xr
 
         data, coords = self.variables()
@@ -119,7 +119,7 @@ def fly(
         done += count
         if progress is not None:
             progress(done, steps)
-            # Chunks grow until each takes about the reporting interval; the result does not depend on where they end.
+            # Chunks grow until each takes about the reporting interval; the result does not depend on their lengths.
             chunk = max(1, int(chunk * min(8.0, PULSE / max(time.perf_counter() - begun, 1e-9))))
         lost_at = float(carry[place])
         if lost_at == 0.0:
@@ -128,7 +128,7 @@ def fly(
         if lost_at >= 0.0:
             return samples[: max(1, int(np.ceil(lost_at / record_every)))].T, state_of(carry, like)
     if steps % record_every == 0 and phases:
-        # The last sample shows the next command; the step after it is flown for that and discarded.
+        # The last sample contains the next command; the step after it is flown for that and discarded.
         flight.fly(phases[-1], carry.copy(), steps, 1)
     return samples.T, state_of(carry, like)
 
@@ -143,7 +143,7 @@ class _Flight:
         self._ready: dict[int, tuple[Arguments, Kernel]] = {}
 
     def _prepared(self, phase: Any) -> tuple[Arguments, Kernel]:
-        """Return arguments and kernel of a phase, made once for all its chunks."""
+        """Return arguments and kernel of a phase, prepared once for all its chunks."""
         if phase.first not in self._ready:
             numbers = Numbers.of(phase)
             parts, more = self.loop.composition(), (self.like, numbers, self.loop.substeps, True)
@@ -152,8 +152,8 @@ class _Flight:
         return self._ready[phase.first]
 
     def fly(self, phase: Any, carry: NDArray[np.float64], first: int, count: int) -> int:
-        """Fly up to `count` control steps from `first` on: to the next sample, or by whole groups between samples. The
-        carry changes in place. Returns the steps flown."""
+        """Fly up to `count` control steps from `first` on, to the next sample or by whole groups between samples. The carry
+        changes in place. Return the number of steps flown."""
         arguments, kernel = self._prepared(phase)
         memories = {"carry": carry, "record": self.samples, "shared": arguments.shared, "tables": arguments.tables}
         memories["own"] = arguments.shared
@@ -168,7 +168,7 @@ class _Flight:
 
 
 def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_every: int) -> Recording:
-    """The samples of `fly` under their names."""
+    """Return the recording of the samples of `fly`."""
     arrays = {"time": np.arange(samples.shape[1]) * (loop.period * record_every)}
     columns: dict[str, Quantity] = {}
     row = 0
@@ -220,11 +220,12 @@ def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
 
 
 def _room(steps: int, record_every: int, width: int) -> NDArray[np.float64]:
-    """Return the storage of a run's samples, a row each: memory or, for many samples, an unnamed file that the system caches
-    as memory allows. Refused if the disk has no room for that file, or if measuring the samples would fill memory."""
+    """Return the storage of a run's samples, a row each: memory or, for many samples, an unnamed file that the system
+    caches as memory allows. Raise InputError if the disk is too small for that file, or memory for metrics of the
+    samples."""
     count = steps // record_every + 1
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 2**33
-    # Measuring holds a dozen numbers of each sample at a time.
+    # Computing metrics needs a dozen numbers per sample at a time.
     most, mapped = memory // (8 * 16), 8 * count * width >= IN_MEMORY
     if mapped:
         most = min(most, shutil.disk_usage(tempfile.gettempdir()).free // (8 * width))
@@ -234,6 +235,6 @@ def _room(steps: int, record_every: int, width: int) -> NDArray[np.float64]:
         return np.full((count, width), np.nan)
     with tempfile.TemporaryFile() as file:
         if hasattr(os, "posix_fallocate"):
-            # A disk that fills up under a mapped file ends the process.
+            # A disk that fills up under a mapped file would kill the process.
             os.posix_fallocate(file.fileno(), 0, 8 * count * width)
         return np.memmap(file, np.float64, "w+", shape=(count, width))

@@ -1,4 +1,4 @@
-"""Many trajectories fly at once: blocks of lanes, divided among threads."""
+"""Flies many trajectories at once: blocks of lanes, divided among threads."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -19,12 +19,12 @@ from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 
 PIECES = 4
-"""Pieces of a batch for each thread; between them progress is reported and an interrupt takes effect. Each piece also flies
-the numbers that all lanes share."""
+"""Pieces of a batch per thread; between them progress is reported and an interrupt takes effect. Each piece also computes
+the numbers common to all lanes."""
 
 
 class ThreadPool:
-    """A pool of threads for the time of a `with` block; work that has not begun at its end is dropped."""
+    """A pool of threads for a `with` block; work that has not begun at its end is dropped."""
 
     def __init__(self, threads: int | None = None) -> None:
         self.threads = max(1, os.cpu_count() or 1 if threads is None else threads)
@@ -37,7 +37,7 @@ class ThreadPool:
         self._pool.shutdown(cancel_futures=True)
 
     def share(self, work: Callable[[range], None], count: int, pieces_each: int = PIECES) -> Callable[..., None]:
-        """Call work(piece) on `count` blocks, divided into `pieces_each` pieces for each thread. The returned function waits
+        """Call work(piece) on `count` blocks, divided into `pieces_each` pieces per thread. Return a function that waits
         for the end and reports progress."""
         size = max(1, -(-count // (self.threads * pieces_each)))
         begun: list[Future[None]] = [
@@ -79,13 +79,13 @@ def simulate_many(
 ) -> Batch:
     """Fly `loop` from each of many states for `steps` control periods.
 
-    starts: states of the body, or an array (numbers of a state, lanes), with or without the effectors' below; first_run: the
-    run number of lane 0, which with the seed fixes its random numbers; phases: those of the loop, `loop.phases(steps)`, with
-    an array (lanes,) in place of every number that differs between lanes, whole numbers excepted, see `stacked`; width:
-    lanes in flight at once on a core.
+    starts: states of the body, or an array (numbers of a state, lanes), with or without those of the effectors below;
+    first_run: the run number of lane 0, which with the seed determines its random numbers; phases: those of the loop,
+    `loop.phases(steps)`, with an array (lanes,) in place of every number that differs between lanes, except integers, see
+    `stacked`; width: simultaneous lanes on a core.
 
-    The result is the same, bit for bit, for any number of threads and any width, and equals that of `fly` lane by lane
-    until the motion diverges."""
+    Return the final states. They are the same, bit for bit, for any number of threads and any width, and equal those of
+    `fly` lane by lane until the motion diverges."""
     start = np.asarray(starts if isinstance(starts, np.ndarray) else [flatten(s) for s in starts], dtype=float)
     start = start if isinstance(starts, np.ndarray) else start.T
     cut = list(loop.phases(steps) if phases is None else phases)
@@ -106,8 +106,9 @@ def simulate_many(
 
 
 class RunningBatch:
-    """A batch of lanes in flight: the carry of each, in blocks of `width` lanes, and the observer's notes on it. `alike` are
-    the indices of the carry's numbers that are equal in all lanes, bit for bit, and stay so: they are flown once for all.
+    """A batch of lanes in flight: the carry of each, in blocks of `width` lanes, and the observer's notes on it. `alike`
+    are the indices of the carry's numbers that are equal in all lanes, bit for bit, and stay so: they are computed once for
+    all.
 
     carries: (numbers, lanes), see `carry_columns`; first_run: the run number of lane 0, or those of all lanes (lanes,);
     noted: (numbers, lanes)."""
@@ -134,17 +135,17 @@ class RunningBatch:
         self._ready: dict[tuple[int, int], Any] = {}
 
     def room(self, numbers: int) -> NDArray[np.float64]:
-        """Blocks (blocks, numbers, width) of zeros."""
+        """Return blocks (blocks, numbers, width) of zeros."""
         return aligned(self.count, numbers, self.width)
 
     def fill(self, blocks: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
-        """Put rows (numbers, lanes) into blocks; the last lane fills up the last block."""
+        """Copy rows (numbers, lanes) into blocks; the last block is filled up with copies of the last lane."""
         short = self.count * self.width - self.lanes
         padded = np.pad(rows, ((0, 0), (0, short)), mode="edge") if short else rows
         blocks[:] = padded.reshape(len(rows), self.count, self.width).swapaxes(0, 1)
 
     def _packed(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Blocks of rows (numbers, lanes)."""
+        """Return blocks of rows (numbers, lanes)."""
         blocks = self.room(len(rows))
         self.fill(blocks, rows)
         return blocks
@@ -157,7 +158,7 @@ class RunningBatch:
         return other
 
     def unpacked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rows (numbers, lanes) of blocks (blocks, numbers, width)."""
+        """Return rows (numbers, lanes) of blocks (blocks, numbers, width)."""
         return np.ascontiguousarray(blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)[:, : self.lanes])
 
     def carries(self) -> NDArray[np.float64]:
@@ -176,8 +177,8 @@ class RunningBatch:
         count: int | None = None,
         observer: Observer | None = None,
     ) -> None:
-        """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on. observer: in
-        place of the batch's, with notes of the same shape."""
+        """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on. observer:
+        replaces the batch's, with notes of the same shape."""
         _, halves, alike, arguments, varying, turn = self.prepare(phase, observer)
         part = self.x[piece.start : piece.stop]
         if turn is not None and first in (None, phase.first):
@@ -191,14 +192,14 @@ class RunningBatch:
         memories |= {"carry": part, "noted": self.noted[piece.start : piece.stop], "own": varying[piece.start : piece.stop]}
         memories |= {"shared": arguments.shared, "tables": arguments.tables}
         run = self.first_run + piece.start * self.width
-        # They are observed even without a step.
+        # Lanes are observed even without a step.
         for step in range(begin, max(end, begin + 1), CHUNK):
             memories["common"] = np.ascontiguousarray(part[0, alike, 0])
             for half in halves:
                 half(memories, step, min(CHUNK, end - step), len(piece), self.width, self.loop.seed, run)
 
     def prepare(self, phase: Phase, observer: Observer | None = None) -> Any:
-        """Compile the kernel of a phase once, before threads use it; phases in the order in which they are flown."""
+        """Compile the kernel of a phase once, before threads use it; call it for phases in the order of flight."""
         observer = observer or self.observer
         key = (id(phase), id(observer))
         if key not in self._ready:
@@ -209,13 +210,13 @@ class RunningBatch:
                 self.alike = tuple(row for row in self.alike if row not in self.rows.state.rate)
             more = (self.like, numbers, self.loop.substeps, observer, self.runs)
             halves, self.alike = make_halves(self.loop.composition(), self.width, self.alike, *more)
-            # The key's objects are kept, so that no others get their ids.
+            # The objects in the key are kept alive, so that no others get their ids.
             kept = (phase, observer)
             self._ready[key] = (kept, halves, list(self.alike), arguments, self._packed(arguments.rows(self.lanes)), turn)
         return self._ready[key]
 
     def _turned(self, phase: Phase) -> Any:
-        """Return a function that gives the body's rates in the lanes of a piece at the start of a phase."""
+        """Return a function that returns the body's rates in the lanes of a piece at the start of a phase."""
         size = self.count * self.width
 
         def whole(leaf: Any) -> Any:
@@ -235,13 +236,13 @@ class RunningBatch:
 
 
 def numbered(first_run: int | NDArray[np.int64]) -> tuple[int, NDArray[np.float64] | tuple[()]]:
-    """Return the run number of lane 0 where those of the others follow it, or 0 and those of all lanes."""
+    """Return the run number of lane 0 if the others follow it, or 0 and the numbers of all lanes."""
     return (first_run, ()) if isinstance(first_run, int) else (0, np.asarray(first_run, dtype=float))
 
 
 def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = None) -> NDArray[np.float64]:
-    """Return the initial carry, one column for each lane, from its state (numbers of a state, lanes). phase: the first,
-    where numbers of it differ between lanes."""
+    """Return the initial carry, one column for each lane, from its state (numbers of a state, lanes). phase: the first, if
+    numbers of it differ between lanes."""
     lanes = start.shape[1]
     varies = phase is not None and any(isinstance(leaf, np.ndarray) for leaf in leaves((phase.gains, phase.nominal)))
     first = loop.carry()
@@ -256,7 +257,7 @@ def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = Non
         columns = np.array([numbers_of(carry) for carry in carries]).T
     else:
         columns = np.repeat(np.array(numbers_of(first))[:, None], lanes, axis=1)
-    # Beside their state, lanes differ in the sign of the quaternion that they start with.
+    # Besides their state, lanes differ in the initial sign of the quaternion policy.
     columns[: min(len(start), moving)] = start
     if loop.aims and not _differ(loop):
         goal = loop.first_attitude()
@@ -273,8 +274,8 @@ def _differ(loop: ClosedLoop) -> bool:
 
 
 def stacked(values: Sequence[Any]) -> Any:
-    """Stack the structures of many lanes into one: numbers that differ become arrays (lanes,). ValueError where more than
-    numbers differ: the form, whole numbers, tables.
+    """Return the structures of many lanes stacked into one: numbers that differ become arrays (lanes,). Raise ValueError if
+    more than numbers differ: the form, integers, tables.
     """
     first = values[0]
     if isinstance(first, (tuple, list)):

@@ -1,4 +1,4 @@
-"""Readings from outside are replayed: what a loop's estimator and law make of them."""
+"""Replays external readings through a loop's estimator and law."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from starhold.simulation.stepper import sensed_of
 
 
 def given_like(loop: ClosedLoop) -> Given:
-    """Make the row of a loop at a control instant, with its values at the start."""
+    """Return the row of a loop at a control instant, with the initial values."""
     carry = loop.carry()
     return Given(sensed_of(loop)[1], carry.state, carry.effectors, carry.command)
 
 
 def replay(loop: ClosedLoop, given: NDArray[np.float64], first: int = 0) -> Recording:
-    """The estimates and commands of a loop at the control steps from `first` on, for rows (steps, numbers) shaped as
-    `given_like`, whose readings are finite; the recording has one sample a step."""
+    """Return the recording of a loop's estimates and commands, one sample per control step from `first` on, for rows
+    (steps, numbers) shaped as `given_like`, whose readings are finite."""
     carry, like, step = loop.carry(), given_like(loop), make_step(loop.composition())
     samples = np.full((len(given), len(flatten(step.sample(carry, 0, loop.setup())))), np.nan)
     numbers, last = np.array(numbers_of(carry)), first + len(given)

@@ -1,4 +1,4 @@
-"""Flies a closed loop control step by control step, with commands of its own law or from outside."""
+"""Flies a closed loop control step by control step, with commands of its own law or external ones."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ class Readings:
     time: float
     """Time since the start (s)."""
     numbers: NDArray[np.float64]
-    """All that follows in a row, (numbers,) or (numbers, lanes)."""
+    """All readings after the time in a row, (numbers,) or (numbers, lanes)."""
     like: Any
     names: tuple[str, ...]
 
     @cached_property
     def measurement(self) -> Any:
-        """The inputs of the loop's own law: errors of attitude and rate, with the target's motion."""
+        """The inputs of the loop's own law: errors of attitude and rate, and the target's motion."""
         return self._part(0)
 
     @cached_property
     def sensors(self) -> dict[str, Any]:
-        """The reading of each sensor, by its name; empty for a loop that knows its state."""
+        """The reading of each sensor by its name; empty for a loop without sensors."""
         return dict(zip(self.names, self._part(1), strict=True))
 
     @cached_property
@@ -64,17 +64,17 @@ def sensed_of(loop: ClosedLoop) -> tuple[Any, Any, Any]:
 
 
 def _shaped(numbers: NDArray[np.float64], like: Any) -> Any:
-    """Numbers, or rows of lanes, in the shape of `like`."""
+    """Return numbers, or rows of lanes, in the shape of `like`."""
     return unflatten(list(numbers) if numbers.ndim > 1 else numbers, like)
 
 
 class Stepper:
-    """One flight of a closed loop, or many at once, one control step per call. A flight with the commands of its own law, or
-    none, has the bits of `simulate`.
+    """One flight of a closed loop, or many at once, one control step per call. A flight with commands of its own law has
+    the bits of `simulate`.
     """
 
     def __init__(self, loop: ClosedLoop, lanes: int | None = None, record: bool = True) -> None:
-        """lanes: the number of flights, None for one without an axis of lanes; record: whether samples are kept."""
+        """lanes: the number of flights, None for one flight without an axis of lanes; record: whether samples are kept."""
         self.loop, self.lanes, self.record = loop, lanes, record
         self._step, self._like = make_step(loop.composition()), loop.carry()
         self._phases = loop.phases(LAST)
@@ -87,7 +87,7 @@ class Stepper:
     def reset(self, seed: int | None = None, run: int | None = None, start: Any = None) -> Readings:
         """Begin again, and return the initial readings. seed, run: of the random numbers, the scenario's if None; many
         flights have the runs from `run` on; start: another state of the body, like `state`, whose numbers may be arrays
-        (lanes,). ValueError for another shape and for what is not finite.
+        (lanes,). Raise ValueError for another shape and for numbers that are not finite.
         """
         loop, lanes = self.loop, self.lanes or 1
         self.seed, self.run = loop.seed if seed is None else seed, loop.run if run is None else run
@@ -107,7 +107,7 @@ class Stepper:
         return self._fly(0, False)
 
     def _hold(self, batch: RunningBatch) -> None:
-        """Take over the numbers that flights carry, and make room for what kernels take and tell."""
+        """Take over the carries of flights, and allocate the memories of kernels."""
         room = {"record": self._sample, "sensed": self.size, "given": len(self._like.command)}
         self._batch = batch
         self._memories = {name: batch.room(size) for name, size in room.items()} | {"carry": batch.x}
@@ -115,7 +115,7 @@ class Stepper:
 
     @property
     def size(self) -> int:
-        """How many numbers readings have."""
+        """The number of numbers in readings."""
         return len(flatten(self._sensed_like))
 
     @property
@@ -125,7 +125,7 @@ class Stepper:
 
     @property
     def state(self) -> Any:
-        """The true state of the body now: numbers, or arrays (lanes,)."""
+        """The present true state of the body: numbers, or arrays (lanes,)."""
         return _shaped(self._read("carry")[: len(flatten(self._like.state))], self._like.state)
 
     @property
@@ -135,18 +135,18 @@ class Stepper:
 
     @property
     def setup(self) -> Any:
-        """The numbers of the parts now."""
+        """The present numbers of the parts."""
         return self._phases[self._phase].setup
 
     @property
     def diverged(self) -> Any:
-        """Whether the motion has diverged: it is not finite, or faster than the integration can follow."""
+        """Whether the motion has diverged: not finite, too fast for the integration, or beyond the divergence bound."""
         return self._read("carry")[self._batch.rows.lost_at] >= 0.0
 
     def step(self, command: ArrayLike | None = None) -> Readings:
-        """Fly one control period, and return the readings at its end. command: held over the period, (3,) or (lanes, 3), and
-        saturated like the law's own (N m, or the body's unit); None: the command of the loop's own law. ValueError for a
-        command that is not finite or of another shape.
+        """Fly one control period, and return the readings at its end. command: held over the period, (3,) or (lanes, 3),
+        and saturated like the law's own (N m, or the body's unit); None: the command of the loop's own law. Raise
+        ValueError for a command that is not finite or of another shape.
         """
         if command is not None:
             wanted = np.asarray(command, dtype=float)
@@ -165,18 +165,18 @@ class Stepper:
         return readings
 
     def prepare(self) -> None:
-        """Compile what steps with commands from outside need, so that none of them waits for it."""
+        """Compile the kernels for steps with external commands, so that no step waits for the compiler."""
         for phase in self._phases:
             self._made(phase, True)
 
     def close(self, command: ArrayLike | None = None) -> None:
-        """Record this instant with the command that would be given now, without a step. ValueError as in `step`."""
+        """Record this instant with the command that would be given now, without a step. Raise ValueError as in `step`."""
         ahead = self.copy()
         ahead.step(command)
         self._ending = ahead._rows[-1] if self.record else None
 
     def copy(self) -> Self:
-        """Return another flight that continues independently from here."""
+        """Return a copy of the flight, which continues independently from here."""
         other = copy(self)
         other._hold(self._batch.copy())
         other._rows = list(self._rows)
@@ -184,7 +184,7 @@ class Stepper:
 
     def samples(self, record_every: int = 1, lane: int = 0) -> tuple[NDArray[np.float64], Any]:
         """Return the samples (number, sample) since the start, and the final carry, like `fly`; without the last instant if
-        its command would have come from outside. ValueError where nothing was recorded."""
+        its command would have been external. Raise ValueError if nothing was recorded."""
         if self._closed and self._ending is None:
             self.close()
         rows = self._rows if self._ending is None else [*self._rows, self._ending]
@@ -197,7 +197,7 @@ class Stepper:
         return samples.reshape(len(samples), self._sample).T, carry
 
     def recording(self, lane: int = 0) -> Recording:
-        """The flight since the start, as `simulate` records it: the `samples` under their names."""
+        """Return the flight since the start, as `simulate` records it."""
         return label(self.loop, *self.samples(lane=lane), 1)
 
     def dataset(self, lane: int = 0) -> xr.Dataset:
@@ -231,7 +231,7 @@ class Stepper:
         return Readings(self.time, self._read("sensed"), self._sensed_like, self._names)
 
     def _made(self, phase: Phase, outside: bool) -> Any:
-        """The kernel of a phase on the memories of this stepper."""
+        """Return the kernel of a phase on the memories of this stepper."""
         key = (phase.first, outside)
         if key not in self._kernels:
             numbers, more = Numbers.of(phase), (self.loop.substeps, outside)
@@ -240,5 +240,5 @@ class Stepper:
         kernel, arguments = self._kernels[key]
         memories = {"shared": arguments.shared, "own": arguments.shared, "tables": arguments.tables} | self._memories
         call = kernel.on(memories)
-        # The memories live as long as the call that has their addresses.
+        # The kernel keeps the memories alive whose addresses it has.
         return lambda *counts, kept=memories: call(*counts)

@@ -1,1 +1,1 @@
-"""Formulas for gains: linear quadratic regulators, pole placement, degree of stability, a slew that settles in time."""
+"""Formulas for gains: linear-quadratic regulators, pole placement, degree of stability, settling time of a slew."""

@@ -1,11 +1,11 @@
 """Places poles exactly by multi-level decomposition: u = -K x gives A - B K any spectrum, for any controllable A, B.
 
-Level k is a pair A_k (n_k, n_k), B_k; the first is A, B. Its inputs act through r_k = rank B_k independent directions, the
+Level k is a pair A_k (n_k, n_k), B_k; the first is A, B. Its inputs act in r_k = rank B_k independent directions, the
 columns of R_k: Bhat_k = B_k R_k has full column rank r_k. With P_k the annihilator of B_k (full row rank, P_k B_k = 0),
 
     A_{k+1} = P_k A_k P_k^+,    B_{k+1} = P_k A_k Bhat_k:
 
-the directions that the inputs reach are the inputs of the rest. The last level has no rest. From there back up,
+the directions reached by the inputs are the inputs of the rest. The last level has no rest. From there back up,
 
     G_k = Bhat_k^+ + K_{k+1} P_k (last: Bhat_k^+),    K_k = R_k (G_k A_k - Phi_k G_k),    K = K_0.
 
@@ -13,13 +13,13 @@ Why it is exact. G_k Bhat_k = E, so G_k (A_k - B_k K_k) = Phi_k G_k: the rows of
 Phi_k. On the kernel of G_k, where P_k is a coordinate, A_k - B_k K_k acts as P_k A_k (P_k^+ - Bhat_k K_{k+1}) =
 A_{k+1} - B_{k+1} K_{k+1}. By induction the spectrum of A - B K is the union of those of all Phi_k.
 
-What it needs. P_k^+ is the pseudo-inverse P'(P P')^-1, which is P' for orthonormal rows only: a right inverse S of P serves
-exactly if Bhat_k^+ S = 0. Another left inverse of Bhat_k with its own S changes A_{k+1} by a multiple of B_{k+1} and
-K_{k+1} with it, and leaves G_k. So K depends on Phi_k and R_k alone, not on the annihilators, and units of the states do
-not matter but for rounding: the levels are found for a balanced A, columns of B of like size and orthonormal bases.
+Conditions. P_k^+ is the pseudo-inverse P'(P P')^-1, which is P' for orthonormal rows only: a right inverse S of P is valid
+exactly if Bhat_k^+ S = 0. Another left inverse of Bhat_k with its S changes A_{k+1} by a multiple of B_{k+1}, and K_{k+1}
+accordingly, but not G_k. So K depends only on Phi_k and R_k, and units of the states matter only for rounding: the levels
+are computed for a balanced A, columns of B of similar size and orthonormal bases.
 
-Complex poles without a place in their level. A level with one direction left over shares a pair p, p* with the level above:
-p in its own Phi_k in direction e of Bhat_k, p* in direction R_k e of the one above. G_k is complex then, and K real still.
+Complex poles shared by two levels. A level with one direction left over shares a pair p, p* with the level above: p in its
+own Phi_k in direction e of Bhat_k, p* in direction R_k e of the level above. Then G_k is complex, but K is still real.
 
 Source: the method of exact pole placement of Zubov, Mikrin, Misrikhanov and Ryabchenko (2012), as Zubov, Lapin and Mikrin
 (2013) use it for attitude control in quaternions.
@@ -44,20 +44,20 @@ Complexes = NDArray[np.complexfloating[Any]]
 Choice = Callable[[int, Array], Array | None] | Sequence[Array | None]
 
 BITS = 512
-"""Binary digits with which the poles reached are measured."""
+"""Working precision in bits for the eigenvalues of the closed loop."""
 
 NEAR = 1e-2
-"""Poles that differ by less than this share of themselves are measured together."""
+"""Poles with a relative difference below this are treated as a cluster."""
 
 ALLOWED = 1e-6
-"""The largest relative error of the poles reached that is accepted."""
+"""The largest accepted relative error of the closed-loop poles."""
 
 GIVEN = 1e-9
-"""Relative tolerance for the annihilators to annihilate, and for directions to count as independent."""
+"""Relative tolerance for annihilators, and for the independence of directions."""
 
 
 class UncontrollableError(ValueError):
-    """No feedback moves the modes s (h,) of the pair: w A = s w and w B = 0 for rows w of left (h, n), of length one."""
+    """No feedback moves the modes s (h,) of the pair: w A = s w and w B = 0 for the unit rows w of left (h, n)."""
 
     def __init__(self, modes: NDArray[Any], left: NDArray[Any]) -> None:
         self.modes, self.left = modes, left
@@ -69,12 +69,11 @@ class UncontrollableError(ValueError):
 
 
 class Placement(NamedTuple):
-    """A placement is a feedback u = -K x, K (m, n), and how it was made.
+    """A feedback u = -K x, K (m, n), and the intermediate results.
 
     spectra: Phi_k (r_k, r_k) of each level, the inputs' first, complex only where two levels share a pair of poles;
-    directions: R_k; strength: the smallest singular value of each B_k relative to the size of the balanced A (of the first:
-    relative to its own largest), zero if the pair is not controllable; error: of the poles that K reaches, see
-    `displacement`."""
+    directions: R_k; strength: the smallest singular value of each B_k over the norm of the balanced A (for the first, over
+    its own largest), zero if the pair is not controllable; error: of the closed-loop poles, see `displacement`."""
 
     K: Array
     spectra: tuple[NDArray[Any], ...]
@@ -84,7 +83,7 @@ class Placement(NamedTuple):
 
 
 class _Level(NamedTuple):
-    """A level is written in bases where Bhat is `rows` transposed: a (size, size), rows (r, size), p (size - r, size).
+    """A level in bases in which Bhat is `rows` transposed: a (size, size), rows (r, size), p (size - r, size).
 
     B = Bhat across and across right = E (r, r). The Bhat_k of the formulas is Bhat scale, up to a positive factor."""
 
@@ -99,7 +98,7 @@ class _Level(NamedTuple):
 
 
 def levels(A: ArrayLike, B: ArrayLike) -> list[int]:
-    """Return how many poles each level takes, the inputs' first, n in all. A: (n, n), B: (n, m). Errors as of `place`."""
+    """Return the number of poles of each level, the inputs' first, n in all. A: (n, n), B: (n, m). Errors as in `place`."""
     return [len(level.rows) for level in _decomposed(*_pair(A, B), None, None)[0]]
 
 
@@ -118,18 +117,18 @@ def place(
     directions: Choice | None = None,
     allowed: float = ALLOWED,
 ) -> Placement:
-    """Return K that gives A - B K these poles. A: (n, n), B: (n, m), real; poles in the unit of A.
+    """Return the feedback K for which A - B K has these poles. A: (n, n), B: (n, m), real; poles in the unit of A.
 
-    Either poles: (n,), real or in conjugate pairs, in any order, each as often as wanted. The slower ones go farther from
-    the inputs; pairs are real 2x2 blocks in one level, where a distribution allows it, else shared by two. Or spectra: real
-    Phi_k, (r_k, r_k) for the r_k of `levels`, in the coordinates of Bhat_k.
+    Either poles: (n,), real or in conjugate pairs, in any order and multiplicity. Slower poles go to levels farther from
+    the inputs; pairs are real 2x2 blocks in one level, where possible, else shared by two. Or spectra: real Phi_k, (r_k,
+    r_k) for the r_k of `levels`, in the coordinates of Bhat_k.
 
-    annihilators: P_k of every level but the last; directions: R_k. A list, or a function of k and B_k (up to a positive
-    factor). None, for all or for one, is the usual: P_k orthonormal; R_k = E where B_k has full column rank, else an
-    orthonormal basis of the space of its rows, which is the pseudo-inverse of T_k in the skeleton B_k = Bhat_k T_k.
+    annihilators: P_k of every level except the last; directions: R_k. A list, or a function of k and B_k (up to a positive
+    factor). None, for all or for one, means the default: P_k orthonormal; R_k = E if B_k has full column rank, else an
+    orthonormal basis of its row space, which is the pseudo-inverse of T_k in the skeleton B_k = Bhat_k T_k.
 
-    ValueError where an argument is not as said or the error of the poles reached is more than `allowed`, which is so
-    for pairs near uncontrollable ones, long chains from few inputs and poles of many sizes; `UncontrollableError`."""
+    Raise UncontrollableError, or ValueError for a wrong argument or an error of the closed-loop poles above `allowed`, as
+    for nearly uncontrollable pairs, long chains from few inputs and poles of very different size."""
     a, b = _pair(A, B)
     if (poles is None) == (spectra is None):
         raise ValueError("give either poles or spectra")
@@ -163,7 +162,7 @@ def place(
 
 
 def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
-    """Return eigenvalues (n,) of A - B K for the very numbers given, A (n, n), B (n, m), K (m, n), by their real part.
+    """Return the eigenvalues (n,) of A - B K for exactly these numbers, A (n, n), B (n, m), K (m, n), by their real part.
 
     Rounding of K alone spreads a pole of multiplicity k by about the k-th root of that rounding."""
     from flint import acb_mat, ctx
@@ -174,14 +173,14 @@ def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
 
 
 def displacement(A: ArrayLike, B: ArrayLike, K: ArrayLike, poles: ArrayLike) -> float:
-    """Return how far the eigenvalues of A - B K are from poles (n,), relative, to first order, with no rounding but K's.
+    """Return the relative distance of eigenvalues of A - B K from poles (n,), to first order, without rounding except K's.
 
-    Simple poles: the largest distance, by the pole's size. Poles closer than NEAR, equal ones above all, are no such smooth
-    functions of K, but the polynomial with these roots is: of k of them, about their mean, the change of its coefficient of
-    degree k - j, by the j-th power of their size. Where that is zero: that of the largest pole, or else of A.
+    For simple poles it is the largest distance over the pole's size. Poles closer than NEAR are not smooth functions of K,
+    but the polynomial with these roots is: for k of them, about their mean, it is the change of its coefficient of degree k
+    - j over the j-th power of their size (if that is zero, of the largest pole's, or else of A's).
 
     These changes a are the numerators of the partial fractions of (reached - wanted) / wanted, characteristic polynomials
-    of exact coefficients. With n simple poles each one reached is surely within n |a| of a wanted one (Gershgorin)."""
+    with exact coefficients. With n simple poles, each pole reached is within n |a| of a wanted one (Gershgorin)."""
     a, b = _pair(A, B)
     return _displacement(a, b, np.asarray(K, float), _checked_poles(poles, len(a)))
 
@@ -213,7 +212,7 @@ def _displacement(a: Array, b: Array, gain: Array, poles: Sequence[complex | acb
 
 
 def _clusters(poles: list[complex]) -> list[list[int]]:
-    """Return places of poles that are near one another, directly or by others between them."""
+    """Return the indices of poles that are near one another, directly or through others between them."""
     clusters: list[list[int]] = []
     for i, pole in enumerate(poles):
         near = [old for old in clusters if any(abs(pole - poles[j]) <= NEAR * max(abs(pole), abs(poles[j])) for j in old)]
@@ -241,8 +240,8 @@ def _roots(spectra: Sequence[Array]) -> list[acb]:
 def _decomposed(
     a: Array, b: Array, annihilators: Choice | None, directions: Choice | None
 ) -> tuple[list[_Level], Array, Array]:
-    """Return the levels, and the scales of the states (n,) and of the inputs (m,) in which they are given."""
-    # By name, for the types of the library are too loose for a strict checker.
+    """Return the levels, and the scales of the states (n,) and of the inputs (m,) in which they are expressed."""
+    # By name, because the types of the library are too loose for a strict checker.
     library: Any = import_module("scipy.linalg")
     a, (units, _) = library.matrix_balance(a, permute=False, separate=True)
     b = b / units[:, None]
@@ -250,11 +249,11 @@ def _decomposed(
     lengths[lengths == 0.0] = 1.0
     size, noise = float(np.linalg.norm(a, 2)), 100.0 * len(a) * float(np.finfo(float).eps)
 
-    # A function of its own and no loop, in whose variables a type checker goes round for long.
+    # A function instead of a loop, whose variables take a type checker long.
     def below(at: int, a: Array, b: Array, scale: Array, down: Array, unit: Array, weakest: float) -> list[_Level]:
         u, s, v = np.linalg.svd(b)
         beside = float(size if at else s[0])
-        # Weak inputs magnify the rounding of the states that they leave to the next level.
+        # Weak inputs amplify the rounding of the states left to the next level.
         rank = int((s > noise / weakest * beside).sum())
         if rank == 0:
             modes, columns = np.linalg.eig(a.T)
@@ -266,7 +265,7 @@ def _decomposed(
         turn = _chosen_directions(directions, at, given, reply)
         inner = reply @ turn
         right = scale @ turn @ np.linalg.inv(inner)
-        # So that across right = E whatever the scales of the inputs.
+        # So that across right = E for any scales of the inputs.
         right += v[:rank].T / s[:rank] @ (np.eye(rank) - across @ right)
         p = _chosen_annihilator(annihilators, at, given, unit, rows, u[:, rank:].T)
         strength = float(s[rank - 1]) / beside
@@ -283,7 +282,7 @@ def _decomposed(
 
 
 def _chosen(name: str, choice: Choice | None, at: int, given: Array, shape: tuple[int, int]) -> Array | None:
-    """Find the choice that was made for a level whose B is `given`, if there is one."""
+    """Return the user's choice for a level whose B is `given`, or None."""
     chosen = choice(at, given) if callable(choice) else choice[at] if choice is not None and at < len(choice) else None
     if chosen is not None and _real(f"{name} of level {at}", chosen).shape != shape:
         raise ValueError(f"{name} of level {at} must have shape {shape}, not {np.shape(chosen)}")
@@ -319,8 +318,8 @@ def _chosen_annihilator(choice: Choice | None, at: int, given: Array, unit: Arra
 
 
 def _dealt(poles: list[complex], sizes: list[int]) -> list[list[complex]]:
-    """Return the poles of each level, the inputs' first: p, p* side by side, but one of a shared pair last in the level
-    below and first in the level above. Real poles are kept for the levels that have an odd place."""
+    """Return the poles of each level, the inputs' first: p, p* side by side, but a shared pair split into the last pole of
+    the level below and the first of the level above. Real poles are kept for levels with an odd number of poles."""
     slow = sorted(poles, key=lambda pole: (abs(pole), pole.real, pole.imag))
     reals, pairs = ([p for p in slow if p.imag == 0.0], [p for p in slow if p.imag > 0.0])
     dealt: list[list[complex]] = []
@@ -341,13 +340,13 @@ def _dealt(poles: list[complex], sizes: list[int]) -> list[list[complex]]:
 
 
 def _blocks(dealt: list[list[complex]], chain: list[_Level]) -> list[NDArray[Any]]:
-    """Return a matrix with the poles dealt to each level, real but for shared pairs."""
+    """Return a matrix with the poles of each level, real except for shared pairs."""
     blocks: list[NDArray[Any]] = []
     along: tuple[Array, Array] | None = None
     for poles, level in zip(reversed(dealt), reversed(chain), strict=True):
         basis, normal = np.eye(len(poles)), np.diag(poles)
         if along is not None:
-            # The shared pole in the direction with which the level below replies, the others where it does not show.
+            # The shared pole in the direction shared with the level below, the others in the null space of the coupling.
             basis = np.column_stack([along[0], np.linalg.svd(along[1][None])[2][1:].T])
         for i, pole in enumerate(poles[:-1]):
             if pole.imag > 0.0:

@@ -1,8 +1,8 @@
-"""Gains of feedback on rate and quaternion from requirements: bandwidth and damping, or a settling time.
+"""Gains of feedback on rate and quaternion from bandwidth and damping, or from a settling time.
 
 The linear loop J a'' + k_rate a' + k_attitude a/2 = 0 (a an angle, q = a/2) has about a principal axis of moment J_i the
-natural frequency sqrt(k_attitude/(2 J_i)) and the damping ratio k_rate/sqrt(2 J_i k_attitude): with one number for all axes
-both are least about the axis of the largest moment.
+natural frequency sqrt(k_attitude/(2 J_i)) and the damping ratio k_rate/sqrt(2 J_i k_attitude): with scalar gains both are
+lowest about the axis of the largest moment.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from starhold.parts.craft import Craft, tensor
 from starhold.synthesis.slews import Search, Turn, settle
 from starhold.synthesis.start import Start
 
-TORQUE = Gain("N m", above=0.0, text="largest norm; all that is available if absent")
+TORQUE = Gain("N m", above=0.0, text="largest norm; all available if absent")
 MOMENTUM = Gain("N m s", above=0.0, text="of the wheels; all available if absent")
 TURN = Gain(
     "1", shape=(4,), spread=False, text="rotation from the target to the body at the start; the scenario's if absent"
@@ -33,13 +33,11 @@ ANGLE_LEFT, RATE_LEFT = (Gain(unit, above=0.0, text="that of [settling] if absen
 
 
 class Bandwidth(NamedTuple):
-    """The form takes the natural frequency and damping of the linear loop: exact about the axis of the largest moment of
-    inertia, more about the others."""
+    """The form takes the natural frequency and damping ratio of the linear loop, exact about the axis of the largest moment
+    of inertia and higher about the others."""
 
-    bandwidth: Annotated[
-        float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="natural frequency, the least of all axes")
-    ]
-    damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
+    bandwidth: Annotated[float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="lowest natural frequency of all axes")]
+    damping: Annotated[float, Gain("1", above=0.0, text="lowest damping ratio of all axes")] = 0.7
 
 
 class Settling(NamedTuple):
@@ -47,7 +45,7 @@ class Settling(NamedTuple):
     target at rest without external torque."""
 
     time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
-    damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
+    damping: Annotated[float, Gain("1", above=0.0, text="lowest damping ratio of all axes")] = 0.7
     torque: Annotated[float | None, TORQUE] = None
     momentum: Annotated[float | None, MOMENTUM] = None
     attitude: Annotated[Quaternion | None, TURN] = None
@@ -62,7 +60,7 @@ Spec = TypeVar("Spec", bound=NamedTuple)
 
 
 def complete(spec: Spec, start: Callable[[], Start]) -> Spec:
-    """Return the inputs of a form; one for a settling time is completed from the scenario's start."""
+    """Return the inputs of a form; the form for a settling time is completed from the scenario's start."""
     left = [name for name in Start.__dataclass_fields__ if getattr(spec, name, 0) is None]
     return spec._replace(**{name: getattr(start(), name) for name in left}) if left else spec
 
@@ -73,8 +71,8 @@ def largest_moment(craft: Craft) -> float:
 
 
 def feedback(moment: float, bandwidth: float, damping: float) -> tuple[float, float]:
-    """Return k_rate (N m s) and k_attitude (N m) for the largest moment of inertia (kg m2); ValueError where they are not
-    finite and positive."""
+    """Return k_rate (N m s) and k_attitude (N m) for the largest moment of inertia (kg m2). Raise ValueError unless they
+    are finite and positive."""
     gains = 2.0 * damping * bandwidth * moment, 2.0 * bandwidth * bandwidth * moment
     if not all(math.isfinite(gain) and gain > 0.0 for gain in gains):
         raise ValueError("the gains leave the range of numbers")
@@ -84,8 +82,8 @@ def feedback(moment: float, bandwidth: float, damping: float) -> tuple[float, fl
 def designs(
     make: Callable[[float, float], Any], torque: Callable[..., Any], share: float = 1.0
 ) -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]:
-    """Return `design`, `explain` and `design_all` of a law with these two forms. `make` gives its gains of k_rate (N m s)
-    and k_attitude (N m), of which the law acts with this share against q near rest."""
+    """Return `design`, `explain` and `design_all` of a law with these two forms. `make` returns its gains from k_rate (N m
+    s) and k_attitude (N m); near rest the law feeds back `share` times k_attitude q."""
 
     def gains_at(moment: float, damping: float, bandwidth: float) -> Any:
         k_rate, stiffness = feedback(moment, bandwidth, damping)
@@ -95,7 +93,7 @@ def designs(
         moments: list[float] = np.linalg.eigvalsh(tensor(craft.inertia)).tolist()
 
         def fastest(gains: Any) -> float:
-            # A bound of the linear loop with k_rate and this share of k_attitude against q.
+            # A bound on the rates of the linear loop with k_rate and this share of k_attitude.
             return max(gains.k_rate / moments[0], math.sqrt(0.5 * share * gains.k_attitude / moments[0]))
 
         return Search(partial(gains_at, moments[-1], spec.damping), fastest, craft, spec)
@@ -116,19 +114,19 @@ def designs(
 def settling(
     torque: Callable[..., Any], kind: type, search: Callable[..., Search], other: Callable[..., Any]
 ) -> tuple[Callable[..., Any], Callable[..., Any], Callable[..., tuple[Any, Turn]]]:
-    """Return `design` and `design_all` of a law whose form `kind` is a `search` of a craft and inputs, and whose others
-    design as `other` does; and the function that gives gains and slew of that form."""
+    """Return `design` and `design_all` of a law whose form `kind` is the `search` of a craft and inputs, and whose other
+    forms use `other`; and the function that returns gains and slew of that form."""
 
     @lru_cache(maxsize=64)
     def settled(craft: Craft, spec: Any) -> tuple[Any, Turn]:
         return settle(torque, [search(craft, spec)])[0]
 
     def design(craft: Craft, spec: Any) -> Any:
-        """Return the gains of a form; ValueError where there are none."""
+        """Return the gains of a form. Raise ValueError if there are none."""
         return settled(craft, spec)[0] if isinstance(spec, kind) else other(craft, spec)
 
     def design_all(cases: Sequence[tuple[Craft, Any]]) -> list[Any]:
-        """Return the gains of many crafts and inputs of one form, each those of `design`."""
+        """Return the gains for many pairs of craft and inputs of one form, equal to those of `design`."""
         if not isinstance(cases[0][1], kind):
             return [other(*case) for case in cases]
         return [gains for gains, _ in settle(torque, [search(*case) for case in cases])]

@@ -1,8 +1,8 @@
-"""Solves the Riccati equation of regulators at rest on target, for any inertia and any weights, and checks the solution.
+"""Solves and checks the Riccati equation of regulators at rest on target, for any inertia and weights.
 
-State (w; q) of body rate (rad/s) and the quaternion's vector part, J w' = u, q' = w/2, cost x'Qx + u'Ru: Q is (6, 6)
-with the rate first, R (3, 3). Weights and moments may span so many orders of magnitude that doubles lose every digit on
-the way, so `solve_riccati`, `riccati_residual` and `linear_modes` work with BITS binary digits; `scipy_axes` is independent.
+State (w; q) of body rate (rad/s) and the quaternion's vector part, J w' = u, q' = w/2, cost x'Qx + u'Ru: Q is (6, 6) with
+the rate first, R (3, 3). Weights and moments may span so many orders of magnitude that doubles lose every digit, so
+`solve_riccati`, `riccati_residual` and `linear_modes` work with BITS binary digits; `scipy_axes` is independent.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.floating[Any]]
 
 BITS = 400
-"""The working precision: rates of a loop and gains may each span a hundred binary digits, and the equations contain
+"""Working precision: rates of a loop and gains may each span a hundred binary digits, and the equations contain
 products."""
 
 AGREED = 1e-40
-"""Newton's steps end when no entry of P moves by more than this share of the scale of its row and column."""
+"""Newton's iteration ends when no entry of P changes by more than this share of the scale of its row and column."""
 
 MOST_STEPS = 300
 
@@ -33,8 +33,7 @@ OUT_OF_RANGE = "the weights are too large or too small for gains to be computed"
 
 
 class Regulator(NamedTuple):
-    """A regulator holds P (6, 6) of the Riccati equation, rate first, and the feedback [K_rate, K_attitude] (3, 6) of u = -K
-    x."""
+    """P (6, 6) of the Riccati equation, rate first, and the feedback [K_rate, K_attitude] (3, 6) of u = -K x."""
 
     p: Array
     feedback: Array
@@ -61,12 +60,12 @@ def is_full(inertia: Array) -> bool:
 
 
 def principal(inertia: Array) -> tuple[Array, Array]:
-    """Return principal moments (3,), rising, and their axes as columns (3, 3) of a symmetric inertia (3, 3), to the
-    last digit.
+    """Return the principal moments (3,) of a symmetric inertia (3, 3) in ascending order, and their axes as columns (3, 3),
+    to the last digit.
 
-    Doubles give a small moment only to the rounding of the largest, and axes to that over the difference of their
-    moments. So they are refined as by Ogita and Aishima (Japan Journal of Industrial and Applied Mathematics 35, 2018).
-    Axes of equal moments, which are arbitrary, are left as they come."""
+    In doubles the error of a small moment is the rounding of the largest, and that of the axes is larger by the inverse of
+    the relative difference of moments. So they are refined as by Ogita and Aishima (Japan Journal of Industrial and Applied
+    Mathematics 35, 2018). Axes of equal moments, which are arbitrary, are not refined."""
     from flint import arb_mat, ctx
 
     if not is_full(inertia):
@@ -76,7 +75,7 @@ def principal(inertia: Array) -> tuple[Array, Array]:
     apart = np.abs(np.subtract.outer(rough, rough)) > SAME * rough[2]
     with ctx.workprec(BITS):
         body, axes, one = _exact(inertia), _exact(start), _exact(np.eye(3))
-        # Each step squares the error, which eigh leaves at a millionth at most.
+        # Each step squares the error, which is at most a millionth after eigh.
         for _ in range(5):
             skew, turned = one - axes.transpose() * axes, axes.transpose() * body * axes
             moments = [turned[i, i] / (1 - skew[i, i]) for i in range(3)]
@@ -92,11 +91,11 @@ def principal(inertia: Array) -> tuple[Array, Array]:
 
 
 def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
-    """Return the regulator of positive definite Q and R, right to the last digit for the numbers given.
+    """Return the regulator of positive definite Q and R, correct to the last digit for the given numbers.
 
     Newton's method in Kleinman's form (IEEE Transactions on Automatic Control 13, 1968): each step solves a Lyapunov
-    equation for the cost P of a stable feedback and continues with the feedback of P, which decreases and in the end
-    converges quadratically. ValueError where numbers overflow or no solution is reached."""
+    equation for the cost P of a stable feedback and continues with the feedback of P, which decreases and converges
+    quadratically in the end. Raise ValueError if numbers overflow or no solution is reached."""
     from flint import ctx
 
     with ctx.workprec(BITS):
@@ -115,8 +114,8 @@ def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
 
 
 def _stable_feedback(inertia: Array, q: Array, r: Array) -> arb_mat:
-    """Return the closed form for the weights' diagonals about the principal axes. With any symmetric positive definite gains
-    the motion is that of a damped spring, hence stable, whatever the off-diagonal weights are."""
+    """Return the closed form for the weights' diagonals about the principal axes. With any symmetric positive definite
+    gains the motion is that of a damped spring, hence stable for any off-diagonal weights."""
     from flint import arb_mat
 
     with np.errstate(all="ignore"):
@@ -126,7 +125,7 @@ def _stable_feedback(inertia: Array, q: Array, r: Array) -> arb_mat:
         k_rate, k_attitude = closed_form(moments, np.diagonal(both.T @ q @ both), cost)
     if not all(np.isfinite(k).all() and (k > 0.0).all() for k in (k_rate, k_attitude)):
         raise ValueError(OUT_OF_RANGE)
-    # Turned without rounding, so that they stay positive definite.
+    # Rotated without rounding, so that they stay positive definite.
     turn = _exact(axes)
     gains = [turn * _exact(np.diag(k)) * turn.transpose() for k in (k_rate, k_attitude)]
     return arb_mat([[gain[i, j] for gain in gains for j in range(3)] for i in range(3)])
@@ -134,7 +133,7 @@ def _stable_feedback(inertia: Array, q: Array, r: Array) -> arb_mat:
 
 def riccati_residual(p: Array, inertia: Array, q: Array, r: Array) -> float:
     """Return the largest entry of A'P + PA - P B R^-1 B'P + Q, relative to the terms on the diagonal of its row and column,
-    which makes it independent of units; without rounding but that of P itself."""
+    which makes it independent of units; without rounding except that of P itself."""
     from flint import ctx
 
     with ctx.workprec(BITS):
@@ -161,7 +160,7 @@ def linear_modes(inertia: Array, feedback: Array) -> NDArray[np.complexfloating[
 
 def scipy_axes(moments: Array, q: Array, r: Array) -> tuple[Array, Array, Array]:
     """Return P11, P12, P22 (each (3,)) for principal moments (3,) and diagonal weights q (6,) and r (3,), by SciPy: the
-    axes, which do not touch one another, one by one, each in units in which r, J and the weight of the attitude are one."""
+    decoupled axes one by one, each in units in which r, J and the weight of the attitude are one."""
     # By name, for the types of the library are too loose for a strict checker.
     library: Any = import_module("scipy.linalg")
     blocks = np.zeros((3, 3))
@@ -213,7 +212,7 @@ def _exact(array: Any) -> arb_mat:
 
 def _floats(matrix: arb_mat) -> Array:
     array = np.array([[float(matrix[i, j].mid()) for j in range(matrix.ncols())] for i in range(matrix.nrows())])
-    # Zeros come out as tiny numbers; the entries of a block have one unit.
+    # Zeros result as tiny numbers; the entries of a block have the same unit.
     for block in (array[i : i + 3, j : j + 3] for i in range(0, array.shape[0], 3) for j in range(0, array.shape[1], 3)):
         block[np.abs(block) < AGREED * np.abs(block).max()] = 0.0
     return array

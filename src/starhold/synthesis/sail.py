@@ -1,5 +1,5 @@
-"""Control by sunlight: the force on a flat reflecting panel, the panel setting for a force, the set of available forces, and
-the visible share of the Sun behind a body.
+"""Control by sunlight: the force on a flat reflecting panel, the panel setting for a force, the set of available forces,
+and the visible share of the Sun past a body.
 
 Light travels along +X (at L1 and L2 the X axis of `libration`). A panel is set by its area, by the cone angle between
 the light and the panel's normal on its dark side, and by the clock angle of that normal about X, from Y towards Z.
@@ -20,7 +20,7 @@ from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add, norm, scale
 
 LAMBERT = 2.0 / 3.0
-"""Recoil of light that leaves a surface in all directions by Lambert's law, in parts of its momentum."""
+"""Recoil of light scattered by Lambert's law, as a share of its momentum."""
 MIRROR_RADIUS = 4.0 / (3.0 * math.sqrt(3.0))
 """Radius of the largest ball of forces of a perfect mirror, in units of pressure times area: 0.3849 of its largest force."""
 MIRROR_CENTRE = 4.0 / 3.0 * math.sqrt(2.0 / 3.0)
@@ -28,9 +28,8 @@ MIRROR_CENTRE = 4.0 / 3.0 * math.sqrt(2.0 / 3.0)
 
 
 class Sail(NamedTuple):
-    """A sail has the pressure of sunlight on a black surface facing it (N/m2), area (m2), mass of the craft (kg), and the
-    parts of the light that are reflected as by a mirror and in all directions; the rest is absorbed, and emitted equally on
-    both sides."""
+    """A sail: the pressure of sunlight on a black surface facing it (N/m2), area (m2), mass of the craft (kg), specular and
+    diffuse reflectivity; the remaining light is absorbed, and emitted equally on both sides."""
 
     pressure: float
     area: float
@@ -40,7 +39,7 @@ class Sail(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """A setting: the area used (m2), cone angle (rad, 0 to pi/2) and clock angle (rad, -pi to pi)."""
+    """A panel setting: the area used (m2), cone angle (rad, 0 to pi/2) and clock angle (rad, -pi to pi)."""
 
     area: float
     cone: float
@@ -48,14 +47,14 @@ class Setting(NamedTuple):
 
 
 class Ball(NamedTuple):
-    """The ball of forces lies about a point on the X axis, in units of pressure times area."""
+    """A ball of forces about a point on the X axis, in units of pressure times area."""
 
     centre: float
     radius: float
 
 
 def make_sail(pressure: float, area: float, mass: float, specular: float = 1.0, diffuse: float = 0.0) -> Sail:
-    """Return a validated sail; ValueError where a number is out of range or more light is reflected than comes."""
+    """Return a validated sail. Raise ValueError if a number is out of range or the reflectivities add up to more than 1."""
     for name, number in {"pressure": pressure, "area": area, "mass": mass}.items():
         if not 0.0 < number < math.inf:
             raise ValueError(f"the {name} must be positive and finite, not {number:g}")
@@ -100,7 +99,7 @@ def set_for(wanted: Vector, sail: Sail) -> Setting:
     """Return the panel of the least area that gives this force (N). In closed form for a mirror, else by bisection of
     the cone angle.
 
-    ValueError where the force points too far from the light, or needs more area than the sail has."""
+    Raise ValueError if the force points too far from the light, or needs more area than the sail has."""
     across = math.hypot(wanted[1], wanted[2])
     if across == 0.0 == wanted[0]:
         return Setting(0.0, 0.0, 0.0)
@@ -117,21 +116,21 @@ def set_for(wanted: Vector, sail: Sail) -> Setting:
 
 
 def steer(control: Vector, sail: Sail) -> Setting:
-    """Return the panel for a control acceleration (m/s2) measured from the centre of the ball of forces: the sail gives
-    it together with the steady push `push(sail)` away from the Sun. Every control within `reach(sail)` is available.
-    ValueError: see `set_for`."""
+    """Return the panel for a control acceleration (m/s2) measured from the centre of the ball of forces: the sail gives it
+    together with the steady push `push(sail)` away from the Sun. Every control within `reach(sail)` is available. Errors as
+    in `set_for`."""
     return set_for(scale(sail.mass, (control[0] + push(sail), control[1], control[2])), sail)
 
 
 def steered(setting: Setting, sail: Sail) -> Vector:
-    """Return the control acceleration (m/s2) that a panel gives, the reverse of `steer`."""
+    """Return the control acceleration (m/s2) of a panel setting, the inverse of `steer`."""
     x, y, z = scale(1.0 / sail.mass, given(setting, sail))
     return (x - push(sail), y, z)
 
 
 def push(sail: Sail) -> float:
-    """Return the acceleration (m/s2) at the centre of the ball of forces: by push/(Omega2 + 2 C) the origin moves towards
-    the Sun."""
+    """Return the acceleration (m/s2) at the centre of the ball of forces; it moves the equilibrium towards the Sun by
+    push/(Omega^2 + 2 C)."""
     return ball(sail.specular, sail.diffuse).centre * sail.pressure * sail.area / sail.mass
 
 
@@ -147,10 +146,10 @@ def lean_of(cone: float, specular: float, diffuse: float) -> float:
 
 
 def widest_cosine(specular: float, diffuse: float) -> float:
-    """Return the cosine of the cone angle at which the force leans farthest from the light. Beyond it the same directions
+    """Return the cosine of the cone angle of the largest angle between light and force. Beyond it the same directions
     recur, with less force."""
     a, b, e = 1.0 - specular, 2.0 * specular, LAMBERT * diffuse
-    # The sign of d(lean)/d(cone) is that of (b2 + 2ab) c2 + (2be + ae) c + e2 - ab, which grows with c.
+    # The sign of d(lean)/d(cone) is that of (b^2 + 2ab) c^2 + (2be + ae) c + e^2 - ab, which grows with c.
     if e * e >= a * b:
         return 0.0
     half = 0.5 * (2.0 * b + a) * e
@@ -158,7 +157,7 @@ def widest_cosine(specular: float, diffuse: float) -> float:
 
 
 def max_lean(specular: float, diffuse: float) -> float:
-    """Return the farthest that a force can lean from the light (rad)."""
+    """Return the largest angle between light and force (rad)."""
     return lean_of(math.acos(widest_cosine(specular, diffuse)), specular, diffuse)
 
 
@@ -171,8 +170,8 @@ def cone_for(lean: float, specular: float, diffuse: float) -> float:
 
 
 def outline(specular: float, diffuse: float, count: int = 181) -> NDArray[np.float64]:
-    """Return the outline (count, 2) of the forces with all the area, along X and across it, in units of pressure times
-    area: from no lean to the widest. The set of all forces is the region between it and the origin, turned about X; it
+    """Return the outline (count, 2) of the forces with the full area, along X and across it, in units of pressure times
+    area, from zero to the largest angle. The set of all forces is the region between it and the origin, rotated about X; it
     is convex."""
     cone = np.linspace(0.0, math.acos(widest_cosine(specular, diffuse)), count)
     c, along = np.cos(cone), 2.0 * specular * np.cos(cone) + LAMBERT * diffuse
@@ -181,9 +180,9 @@ def outline(specular: float, diffuse: float, count: int = 181) -> NDArray[np.flo
 
 @cache
 def ball(specular: float, diffuse: float) -> Ball:
-    """Return the largest ball about a point of the X axis within the forces that a sail can give. Exact for a mirror, else
-    to ten digits: the radius is a concave function of the centre, because the set is convex. Where nothing is scattered it
-    is `specular` times that of a mirror."""
+    """Return the largest ball about a point of the X axis within the forces that a sail can give. It is exact for a mirror,
+    else correct to ten digits: the radius is a concave function of the centre, because the set is convex. Without diffuse
+    reflection it is `specular` times that of a mirror."""
     check_optics(specular, diffuse)
     if specular == 1.0:
         return Ball(MIRROR_CENTRE, MIRROR_RADIUS)
@@ -200,10 +199,10 @@ def ball(specular: float, diffuse: float) -> Ball:
 
 
 def room(centre: float, specular: float, diffuse: float) -> float:
-    """Return the distance from a point of the X axis to the nearest unavailable force (units of pressure times area)."""
+    """Return the distance from a point of the X axis to the nearest unavailable force, in units of pressure times area."""
     a, b, e = 1.0 - specular, 2.0 * specular, LAMBERT * diffuse
-    # The squared distance to the outline is a polynomial in the cosine c of the cone angle. Between the bends of its slope,
-    # the slope changes its sign once at most: to try all such places finds every minimum.
+    # The squared distance to the outline is a polynomial in the cosine c of the cone angle. Between the extrema of its
+    # slope, the slope changes sign at most once: trying all such intervals finds every minimum.
     c4, c3, c2 = b * (b + 2.0 * a), 2.0 * (a + b) * e - 2.0 * centre * b, a * a + e * e - 2.0 * centre * e
     c1, c0 = -2.0 * centre * a, centre * centre
     edge = widest_cosine(specular, diffuse)
@@ -214,12 +213,12 @@ def room(centre: float, specular: float, diffuse: float) -> float:
 
     near = knots + [rising(slope, low, high) for low, high in pairwise(knots)]
     arc = math.sqrt(max(0.0, min(c0 + c * (c1 + c * (c2 + c * (c3 + c * c4))) for c in near)))
-    # Beside the outline the set ends in the cone of the widest lean.
+    # Besides the outline, the boundary of the set is the cone of the largest angle.
     return min(arc, centre * math.sin(max_lean(specular, diffuse)))
 
 
 def _quadratic(a: float, b: float, c: float) -> list[float]:
-    """Return the real roots of a x2 + b x + c, also where a is next to nothing."""
+    """Return the real roots of a x^2 + b x + c, also for a nearly zero."""
     inside = b * b - 4.0 * a * c
     if inside < 0.0:
         return []
@@ -228,16 +227,15 @@ def _quadratic(a: float, b: float, c: float) -> list[float]:
 
 
 def lit(offset: Any) -> NDArray[np.float64]:
-    """Return the part of the Sun's disc that can be seen at an offset from the axis in radii of the body before it (any
-    shape), where both discs look equal, as they nearly do at the Earth's L2: 1 - (2/pi)(arccos s - s sqrt(1 - s2)), s =
-    offset/2."""
+    """Return the visible share of the Sun's disc at an offset from the axis in radii of the occulting body (any shape), for
+    apparently equal discs, nearly as at the Earth's L2: 1 - (2/pi)(arccos s - s sqrt(1 - s^2)), s = offset/2."""
     s = np.minimum(0.5 * np.abs(np.asarray(offset, dtype=float)), 1.0)
     return 1.0 - (2.0 / math.pi) * (np.arccos(s) - s * np.sqrt(1.0 - s * s))
 
 
 def lit_discs(separation: Any, sun: float, body: float) -> NDArray[np.float64]:
-    """Return the part of the Sun's disc (angular radius `sun`) that can be seen past a disc of angular radius `body`
-    when their centres are this far apart (any shape); angles in one unit, small, the Sun equally bright all over."""
+    """Return the visible share of the Sun's disc (angular radius `sun`) past a disc of angular radius `body` at this
+    separation of their centres (any shape); small angles in the same unit, the Sun uniformly bright."""
     t = np.clip(np.abs(np.asarray(separation, dtype=float)), max(abs(sun - body), 1e-300), sun + body)
     ours = sun * sun * np.arccos(np.clip((t * t + (sun - body) * (sun + body)) / (2.0 * t * sun), -1.0, 1.0))
     theirs = body * body * np.arccos(np.clip((t * t - (sun - body) * (sun + body)) / (2.0 * t * body), -1.0, 1.0))

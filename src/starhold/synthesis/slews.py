@@ -1,4 +1,4 @@
-"""Searches for the lowest gains with which a slew settles in time, by flying trial slews to a target at rest."""
+"""Searches for the lowest gains with which a slew settles in time, by simulating slews to a target at rest."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from starhold.synthesis.start import Start
 from starhold.trace.calling import Compiled
 
 STEPS = 4000
-"""The integration steps of a trial slew, and the largest multiple of them."""
+"""Integration steps of a trial slew, and their largest multiple."""
 MOST = 64
 RESOLVED = 0.4
 """The largest step as a share of the fastest time constant."""
 ON_TARGET = Goal((1.0, 0.0, 0.0, 0.0), ZERO, ZERO)
 IN_HAND = 0.99
-"""Share of the required settling time that designs use: with a held torque the loop settles a little later."""
+"""Share of the required settling time used by designs: with a held torque the loop settles slightly later."""
 
 
 class Turn(NamedTuple):
-    """A trial slew has the time at which it settled (s; infinite where it did not), and the largest norms of the torque
-    (N m) and of the wheel momentum (N m s; 0 without wheels)."""
+    """A trial slew: the settling time (s; infinite if it did not settle), and the largest norms of the torque (N m) and of
+    the wheel momentum (N m s; 0 without wheels)."""
 
     time: float
     torque: float
@@ -45,8 +45,8 @@ class Turn(NamedTuple):
 
 @dataclass(frozen=True)
 class Search:
-    """A search for the least scale x (1/s) whose gains settle in time. gains_of(x): the gains; rate_of(gains): the fastest
-    rate (1/s) of the loop, which the integration must resolve."""
+    """A search for the least scale x (1/s) whose gains settle in time. gains_of(x) returns the gains, rate_of(gains) the
+    fastest rate (1/s) of the loop, which the integration must resolve."""
 
     gains_of: Callable[[float], Any]
     rate_of: Callable[[Any], float]
@@ -55,12 +55,12 @@ class Search:
 
     @cached_property
     def form(self) -> Any:
-        """All that the kernels of its slews depend on besides the gains."""
+        """The key, besides the gains, on which the kernels of its slews depend."""
         return self.spec.wheel_momentum is not None, _form(self.craft)
 
     @cached_property
     def begun(self) -> tuple[Quaternion, Vector, Vector]:
-        """Attitude, rate (rad/s) and the wheels' momentum (N m s) at the start."""
+        """Initial attitude, rate (rad/s) and wheel momentum (N m s)."""
         size = math.hypot(*self.spec.attitude)
         q, w, h = (
             tuple(map(float, part or ZERO)) for part in (self.spec.attitude, self.spec.rate, self.spec.wheel_momentum)
@@ -81,14 +81,14 @@ class Search:
 
 Found = TypeVar("Found")
 Trials: TypeAlias = Generator[tuple[float, float], Turn, Found]
-"""Asks for slews, each of a scale x (1/s) over a horizon (s), one after another, and returns what it finds."""
+"""A generator that requests slews, each of a scale x (1/s) over a horizon (s), and returns the result of its search."""
 
 
 def settle(torque: Callable[..., Any], searches: Sequence[Search]) -> list[tuple[Any, Turn]]:
-    """Return for each search the gains of the least scale, and their slew. The searches go on side by side, so that the next
-    slews of all fly together; each finds what it finds alone.
+    """Return for each search the gains of the least scale, and their slew. The searches run side by side, so that the next
+    slews of all fly together; the results are those of separate searches.
 
-    ValueError states the shortest time where the torque or the momentum does not allow the required one."""
+    Raise ValueError, with the shortest possible time, if the torque or the momentum does not allow the required one."""
     trials = [_least(search.spec) for search in searches]
     wanted = {place: next(trial) for place, trial in enumerate(trials)}
     settled = dict[int, tuple[Any, Turn]]()
@@ -106,7 +106,7 @@ def settle(torque: Callable[..., Any], searches: Sequence[Search]) -> list[tuple
 
 
 def _least(spec: Any) -> Trials[tuple[float, Turn]]:
-    """Find the least scale that settles in time, and its slew."""
+    """Search for the least scale that settles in time; return it with its slew."""
     if any(getattr(spec, name, 0) is None for name in Start.__dataclass_fields__ if name != "wheel_momentum"):
         raise ValueError("a design that settles in time needs the start, the tolerances and the torque")
     if not any(spec.attitude):
@@ -128,7 +128,7 @@ def _least(spec: Any) -> Trials[tuple[float, Turn]]:
             raise ValueError(_refusal(spec, (yield from _soonest(allowed, high)), refused))
     elif slew.time > required:
         raise ValueError(_refusal(spec, (yield from _soonest(allowed, high)), slew))
-    # A turn that is over before it begins leaves the gains as they were tried.
+    # If the first trial settles in time, its gains are kept.
     while low > 0.0 and high - low > 1e-4 * high:
         middle = 0.5 * (low + high)
         tried = yield middle, horizon
@@ -140,7 +140,7 @@ def _least(spec: Any) -> Trials[tuple[float, Turn]]:
 
 
 def _border(allowed: Callable[[Turn], bool], low: float, high: float, horizon: float) -> Trials[float]:
-    """Find the largest scale that is allowed, between one that is (or zero) and one that is not."""
+    """Return the largest allowed scale, between an allowed one (or zero) and one that is not."""
     while low == 0.0 and high > 0.0 and not allowed((yield 0.5 * high, horizon)):
         high *= 0.5
     for _ in range(30):
@@ -150,10 +150,10 @@ def _border(allowed: Callable[[Turn], bool], low: float, high: float, horizon: f
 
 
 def _soonest(allowed: Callable[[Turn], bool], most: float) -> Trials[float]:
-    """Find about the shortest time in which any scale up to `most` settles."""
+    """Return approximately the shortest time in which a scale up to `most` settles."""
     best = math.inf
     for x in (most / 1.1**k for k in range(80) if most > 0.0):
-        # Until it settles, or the horizon is too long for the steps that the loop needs.
+        # Until it settles, or the horizon needs too many steps.
         with suppress(ValueError):
             for k in range(1, 6):
                 slew = yield x, 4.0**k / x
@@ -173,9 +173,9 @@ def _refusal(spec: Any, best: float, slew: Turn) -> str:
 
 
 def fly(torque: Callable[..., Any], trials: Sequence[tuple[Search, float, float]]) -> list[Turn | ValueError]:
-    """Fly slews, each of a search, at a scale (1/s), over a horizon (s), of a body under a law that acts on it without
-    pause. Those of one form fly together. A ValueError in place of a slew says why there is none, as where its loop is too
-    fast to be followed."""
+    """Simulate slews, each of a search, at a scale (1/s), over a horizon (s), under continuous control; those of the same
+    form together. Return each slew, or a ValueError with the reason if there is none, such as a loop that is too fast for
+    the integration."""
     answers: list[Turn | ValueError] = [ValueError()] * len(trials)
     alike = dict[Any, list[tuple[int, Search, Any, float]]]()
     for place, (search, x, horizon) in enumerate(trials):
@@ -201,7 +201,7 @@ def fly(torque: Callable[..., Any], trials: Sequence[tuple[Search, float, float]
 
 
 def _steps(rate: float, spec: Any, horizon: float) -> int:
-    """Return the steps of a slew whose loop has this fastest rate (1/s). ValueError where it is too fast to be followed."""
+    """Return the steps of a slew whose loop has this fastest rate (1/s). Raise ValueError if it is too fast."""
     least = max(rate, math.hypot(*spec.rate)) * horizon / (STEPS * RESOLVED)
     many = next((m for m in (1, 4, 16, MOST) if m >= least), None)
     if many is None:
@@ -210,7 +210,7 @@ def _steps(rate: float, spec: Any, horizon: float) -> int:
 
 
 class _Like:
-    """Arguments of a kernel are equal to others of the same form."""
+    """Arguments of a kernel, equal to others of the same form."""
 
     def __init__(self, values: Any) -> None:
         self.values, self.form = values, _form(values)
@@ -230,8 +230,8 @@ def _form(value: Any) -> Any:
 
 @cache
 def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -> Compiled:
-    """Compile the slew: gains, craft, start, step and squared ends give the last step at which angle or rate was outside
-    (-1: at none), and the largest squares of torque and of the wheel momentum."""
+    """Return the compiled slew, a function of gains, craft, start, step and squared tolerances. It returns the last step at
+    which angle or rate was outside (-1: none), and the largest squares of torque and of wheel momentum."""
 
     def command(moving: Any, gains: Any, craft: Craft, step: Scalar) -> Vector:
         attitude, rate, stored = moving

@@ -1,12 +1,12 @@
-"""Gains of u = -k_rate w - k_attitude S, S = 4 q0 q, are designed for the largest decay rate (degree of stability)
-within the torque limit of a wheel.
+"""Gains of u = -k_rate w - k_attitude S, S = 4 q0 q, with the largest decay rate (degree of stability) within the torque
+limit of a wheel.
 
 With the gyroscopic torque compensated, each axis obeys, near the target and with time in units of t0,
 
     i l^2 + K_w l + 2 K_a = 0,    i = J_axis / J_x,  K_a = t0^2 k_attitude / J_x,  K_w = t0 k_rate / J_x,
 
 and the decay rate (degree of stability) is eta = -max Re l over the axes. The initial error (alpha, rad) and the initial
-rate (omega, 1/t0) must not demand more than the wheel's torque: 2 K_a alpha + K_w omega <= L. The torque that compensates is
+rate (omega, 1/t0) must not demand more than the wheel's torque: 2 K_a alpha + K_w omega <= L. The compensating torque is
 not counted.
 
 Why `optimum` is the optimum. Every root lies left of -h exactly where i (m - h)^2 + K_w (m - h) + 2 K_a has no root with a
@@ -15,11 +15,11 @@ largest ratio,
 
     eta >= h  <=>  K_w >= 2 b h  and  2 K_a >= K_w h - a h^2.
 
-Both bounds rise with K_w, so no gains with eta >= h demand less torque, whatever alpha and omega, than the corner
-K_w = 2 b h, 2 K_a = (2 b - a) h^2, where K_a = c K_w^2 with c = (2 b - a) / (8 b^2) = (1 - (1 - a/b)^2) / (8 a). The
-corner's demand, (2 b - a) alpha h^2 + 2 b omega h, rises with h: the largest h spends the whole budget. For alpha > 0 the
-corner is the only optimum. For alpha = 0 the budget bounds K_w alone, and any larger K_a does as well: the corner is the
-least of them. For omega = 0 it bounds K_a alone, and still the corner is the only one, for more damping slows axis a. For
+Both bounds increase with K_w, so for any alpha and omega no gains with eta >= h demand less torque than the corner K_w = 2
+b h, 2 K_a = (2 b - a) h^2, where K_a = c K_w^2 with c = (2 b - a) / (8 b^2) = (1 - (1 - a/b)^2) / (8 a). The corner's
+demand, (2 b - a) alpha h^2 + 2 b omega h, increases with h: the largest h uses the whole budget. For alpha > 0 the corner
+is the only optimum. For alpha = 0 the budget bounds only K_w, and any larger K_a is as good: the corner is the least of
+them. For omega = 0 it bounds only K_a, and the corner is still the only optimum, because more damping slows axis a. For
 equal moments c = 1/(8a): the critically damped double root. The order of the axes does not matter.
 
 Source: study of reaction-wheel attitude control, degree of stability.
@@ -41,7 +41,7 @@ OUT_OF_RANGE = "the gains leave the range of floating-point numbers"
 
 
 class Optimum(NamedTuple):
-    """An optimum is a pair of scaled gains and the scaled decay rate that they give."""
+    """Optimal scaled gains and their scaled decay rate."""
 
     K_a: float
     K_w: float
@@ -49,7 +49,7 @@ class Optimum(NamedTuple):
 
 
 class Scale(NamedTuple):
-    """The equations have no dimension in these units.
+    """The units in which the equations have no dimension.
 
     moment: J_x (kg m2); t0: H_max / Hdot_max (s); L: the wheel's torque, Hdot_max t0^2 / J_x, which is also its momentum
     in units of J_x / t0; ratios: J_axis / J_x of the three axes."""
@@ -60,17 +60,16 @@ class Scale(NamedTuple):
     ratios: tuple[float, float, float]
 
     def gains(self, K_a: float, K_w: float) -> tuple[float, float]:
-        """Return k_attitude (N m) and k_rate (N m s) of scaled gains."""
+        """Return k_attitude (N m) and k_rate (N m s) from scaled gains."""
         return K_a * self.moment / self.t0 / self.t0, K_w * self.moment / self.t0
 
     def scaled(self, k_attitude: float, k_rate: float) -> tuple[float, float]:
-        """Return k_a and K_w of gains in N m and N m s."""
+        """Return the scaled K_a and K_w from gains in N m and N m s."""
         return k_attitude * self.t0 * self.t0 / self.moment, k_rate * self.t0 / self.moment
 
 
 class Designed(NamedTuple):
-    """A design is t0 (s), L, ratios (3,), K_a, K_w and eta, all scaled, then eta in 1/s, k_attitude (N m), k_rate (N m
-    s)."""
+    """A design: t0 (s); L, ratios (3,), K_a, K_w and eta, all scaled; eta in 1/s, k_attitude (N m), k_rate (N m s)."""
 
     t0: float
     L: float
@@ -87,7 +86,7 @@ def degree(K_a: ArrayLike, K_w: ArrayLike, ratios: ArrayLike) -> Array:
     """Return the decay rate (degree of stability), -max Re l over the axes (1/t0), of scaled gains of any sign.
 
     K_a and K_w have any shapes (...) that broadcast; ratios is (n,), or (..., n) with one set of ratios for each pair of
-    gains. Returns (...). ValueError where a ratio is not positive."""
+    gains; the result is (...). Raise ValueError if a ratio is not positive."""
     i = np.asarray(ratios, dtype=float)
     if i.ndim == 0 or i.shape[-1] == 0 or not (i > 0.0).all():
         raise ValueError("ratios must be positive, one for each axis")
@@ -95,15 +94,15 @@ def degree(K_a: ArrayLike, K_w: ArrayLike, ratios: ArrayLike) -> Array:
     inside = damping * damping - 8.0 * i * stiffness
     root = np.sqrt(np.maximum(inside, 0.0))
     slowest = (damping - root) / (2.0 * i)
-    # The same root without the difference of near numbers, which strong damping makes of it.
+    # The same root without the cancellation that occurs with strong damping.
     total = damping + root
     rationalised = 4.0 * stiffness / np.where(total > 0.0, total, 1.0)
     return np.where((inside > 0.0) & (damping > 0.0), rationalised, slowest).min(axis=-1)
 
 
 def boundary(ratios: ArrayLike) -> float:
-    """Return c of the curve K_a = c K_w^2: above it the oscillation of the largest moment's axis decides eta, below it the
-    slow aperiodic motion of the smallest's. ratios: (3,), positive, else ValueError."""
+    """Return c of the curve K_a = c K_w^2: above it the oscillation about the axis of the largest moment determines eta,
+    below it the slow aperiodic motion about that of the smallest. ratios: (3,). Raise ValueError unless positive."""
     a, b = _extremes(ratios)
     return (2.0 - a / b) / (8.0 * b)
 
@@ -111,12 +110,12 @@ def boundary(ratios: ArrayLike) -> float:
 def optimum(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Optimum:
     """Return the scaled gains of the largest decay rate within 2 K_a alpha + K_w omega <= budget.
 
-    ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0);
-    budget: L. ValueError where ratios or the budget are not positive, where alpha or omega are negative or both zero, for
-    then nothing bounds the gains, and where the gains leave the range of floats."""
+    ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0); budget:
+    L. Raise ValueError if ratios or the budget are not positive, if alpha or omega is negative or both are zero, because
+    then nothing bounds the gains, and if the gains leave the range of floats."""
     a, b = _extremes(ratios)
     alpha, omega, budget = _demands(alpha, omega, budget)
-    # The positive root of (2 b - a) alpha h^2 + 2 b omega h = L, in the form that holds for alpha = 0 too.
+    # The positive root of (2 b - a) alpha h^2 + 2 b omega h = L, in the form valid for alpha = 0 too.
     turn = b * omega
     lower = turn + math.hypot(turn, math.sqrt(2.0 * b - a) * math.sqrt(alpha) * math.sqrt(budget))
     eta = budget / lower if lower > 0.0 else math.inf
@@ -130,8 +129,9 @@ def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, po
     """Return the best of a grid of gains along and below the budget line, `points` each way, refined `rounds` times
     around it.
 
-    It uses `degree` and the budget, and nothing of `optimum`, whose arguments and errors it shares. Sets of equal or larger
-    eta are convex, so the best lies next to the best point of a line and of the grid: eta is right to about 1e-9, relative.
+    It uses only `degree` and the budget, independently of `optimum`, whose arguments and errors it shares. The sets of
+    gains with eta above a value are convex, so the best lies next to the best point of a line and of the grid: the relative
+    error of eta is about 1e-9.
     """
     a, b = _extremes(ratios)
     alpha, omega, budget = _demands(alpha, omega, budget)
@@ -139,7 +139,7 @@ def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, po
         raise ValueError(f"points must be at least 5 and rounds at least 1, not {points} and {rounds}")
     most_a = budget / (2.0 * alpha) if alpha > 0.0 else math.inf
     most_w = budget / omega if omega > 0.0 else math.inf
-    # Where all axes oscillate more stiffness changes nothing, and where none does more damping only slows.
+    # If all axes oscillate, more stiffness changes nothing, and if none does, more damping only slows.
     most_a, most_w = min(most_a, most_w * most_w / (8.0 * a)), min(most_w, math.sqrt(8.0 * b * most_a))
     if not (0.0 < most_a < math.inf and 0.0 < most_w < math.inf):
         raise ValueError(OUT_OF_RANGE)
@@ -159,7 +159,7 @@ def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, po
 def scale(moments: ArrayLike, torque: float, momentum: float) -> Scale:
     """Return units for principal moments (3,) (kg m2), a wheel's largest torque Hdot_max (N m) and momentum H_max (N m s).
 
-    ValueError where these are not positive and finite, or no rigid body has these moments."""
+    Raise ValueError if these are not positive and finite, or no rigid body has these moments."""
     if np.shape(moments) != (3,):
         raise ValueError(f"moments must be three numbers, not an array of shape {np.shape(moments)}")
     x, y, z = (float(moment) for moment in np.diagonal(check_inertia(moments)))
@@ -175,9 +175,9 @@ def design_gains(moments: ArrayLike, torque: float, momentum: float, angle: floa
     """Return the gains of the largest decay rate whose demand in the initial state is within the torque limit.
 
     moments: principal, (3,) (kg m2); torque: Hdot_max (N m) and momentum: H_max (N m s) of each axis' wheel; angle: largest
-    initial error (rad, at most pi); rate: largest initial rate (rad/s). ValueError as `scale` and `optimum` raise it. A
-    momentum J rate above H_max, which no wheel started at rest can take up, is not refused: no gains change that. H_max sets
-    the unit of time alone; the gains in N m and N m s do not depend on it."""
+    initial error (rad, at most pi); rate: largest initial rate (rad/s). Errors as in `scale` and `optimum`. A momentum J
+    rate above H_max, which no wheel started at rest can absorb, is not refused: no gains change that. H_max only sets the
+    unit of time; the gains in N m and N m s do not depend on it."""
     units = scale(moments, torque, momentum)
     angle, rate = _not_negative("angle", angle), _not_negative("rate", rate)
     if angle > math.pi:
@@ -200,7 +200,7 @@ def _extremes(ratios: ArrayLike) -> tuple[float, float]:
 
 
 def _demands(alpha: float, omega: float, budget: float) -> tuple[float, float, float]:
-    """Return the three as plain floats; ValueError where they bound no gain."""
+    """Return the three as floats. Raise ValueError if they bound no gain."""
     given = _not_negative("alpha", alpha), _not_negative("omega", omega), _positive("budget", budget)
     if given[0] == 0.0 and given[1] == 0.0:
         raise ValueError("alpha and omega are both 0: the budget bounds no gain")
@@ -220,7 +220,7 @@ def _not_negative(name: str, value: float) -> float:
 
 
 def _best_stiffness(K_w: Array, most: Array, ratios: ArrayLike, points: int, rounds: int) -> tuple[Array, Array]:
-    """Find for each damping (n,) the best stiffness up to `most` (n,), from a grid refined around its best, and its eta."""
+    """Return the best stiffness up to `most` (n,) for each damping (n,), from a grid refined around its best, and eta."""
     low, high = np.zeros_like(most), most
     rows = np.arange(len(K_w))
     best = low, low

@@ -1,4 +1,4 @@
-"""A scenario gives designs the start and the available torque and momentum."""
+"""The initial state, torque and momentum that a scenario provides to designs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from starhold.algebra.vector import Vector
 
 @dataclass(frozen=True)
 class Start:
-    """A scenario gives a design the rotation from the target axes to the body axes, the rate relative to the target
-    (rad/s) and the wheel momentum (N m s, body axes; None for a craft without) at the start; the torque (N m) and, of
-    wheels, the angular momentum (N m s) available about every axis, infinite for no limit; and the angle (rad) and rate
-    (rad/s) at which the target counts as reached."""
+    """Inputs of a design from a scenario: the initial rotation from the target axes to the body axes, rate relative to the
+    target (rad/s) and wheel momentum (N m s, body axes; None without wheels); the torque (N m) and, for wheels, the angular
+    momentum (N m s) available about every axis, infinite for no limit; and the angle (rad) and rate (rad/s) at which the
+    target counts as reached."""
 
     attitude: Quaternion
     rate: Vector

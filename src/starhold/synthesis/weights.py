@@ -1,4 +1,4 @@
-"""Weights of regulators are refused where they make no sense, and balanced onto the globally stable family."""
+"""Checks the weights of regulators, and balances them onto the globally stable family."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating[Any]]
 
 MOST_SPREAD = 1e12
-"""Largest over smallest eigenvalue of q's rate part, of q's attitude part and of r, each by itself since their units differ.
-Gains then span at most as much, and stay positive as full matrices of doubles, which hold sixteen digits."""
+"""Largest ratio of the largest to the smallest eigenvalue of q's rate part, of q's attitude part and of r, each separately
+because their units differ. Gains then span at most as much, and stay positive definite as full matrices of doubles, which
+have sixteen digits."""
 
 SAME = 1e-10
-"""Principal moments that differ by no more than this share of the largest are equal: rounding alone decides their axes."""
+"""Principal moments that differ by at most this share of the largest are equal: rounding alone decides their axes."""
 
 BALANCES = ("none", "least", "q4", "q5", "q6", "r1", "r2", "r3")
-"""Weights that `balance` may move: none, all of them least in logarithm, or the one named."""
+"""Weights that `balance` may change: none, all by the least change in logarithm, or the one named."""
 
 
 def kappa(moments: Array, y: Array) -> float:
@@ -27,16 +28,16 @@ def kappa(moments: Array, y: Array) -> float:
 
 
 def balance(moments: Array, q: Array, r: Array, how: str) -> tuple[Array, Array]:
-    """Return weights q (6,) and r (3,) for moments (3,) moved to where kappa vanishes: the one that `how` names, or all
-    least.
+    """Return weights q (6,) and r (3,) for moments (3,) changed so that kappa vanishes: the one that `how` names, or all by
+    the least change.
 
-    ValueError where kappa vanishes for no value of the named weight; that of the middle moment's axis always can."""
+    Raise ValueError if kappa vanishes for no value of the named weight; for the middle moment's axis it always does."""
     share = np.roll(moments, -2) - np.roll(moments, -1)
     parts = share / np.sqrt(q[3:] / r)
     if abs(parts.sum()) <= 4.0 * np.finfo(float).eps * np.abs(parts).sum():
         return q, r
     q, r = q.copy(), r.copy()
-    # The share of the middle moment's axis has the other sign than both others, so a positive y there always balances.
+    # The term of the middle moment's axis has the opposite sign of both others, so a positive y there always balances.
     middle = int(np.argmax(np.abs(share)))
     axis = middle if how == "least" else (int(how[1]) - 1) % 3
     if how == "least":
@@ -54,9 +55,9 @@ def balance(moments: Array, q: Array, r: Array, how: str) -> tuple[Array, Array]
 
 
 def _least_shift(parts: Array, middle: int) -> Array:
-    """Return the least change of log y (3,) that makes the sum of `parts` exp(-change) vanish."""
+    """Return the least change of log y (3,) for which the sum of `parts` exp(-change) vanishes."""
     library: Any = import_module("scipy.optimize")
-    # The middle one's change follows from those of the others, whose parts have the other sign.
+    # The middle change follows from the others, whose terms have the opposite sign.
     others = [axis for axis in range(3) if axis != middle and parts[axis]]
     size = np.log(np.abs(parts[others]) / abs(parts[middle]))
 
@@ -70,7 +71,7 @@ def _least_shift(parts: Array, middle: int) -> Array:
         last = follows(change)
         return 2.0 * (change + last * np.exp(size - change + last))
 
-    # There can be a least change for each axis that moves alone.
+    # There may be a local least change near each axis that changes alone.
     starts = [np.zeros(len(others))]
     for number, part in enumerate(size):
         alone = 1.0 - float(np.exp(np.delete(size, number)).sum())
@@ -83,7 +84,7 @@ def _least_shift(parts: Array, middle: int) -> Array:
 
 
 def positive(given: Any, size: int, name: str) -> Array:
-    """Return the weights as an array of `size`; ValueError, which calls them `name`, where they are not positive."""
+    """Return the weights as an array of `size`. Raise ValueError, with `name` in the message, if they are not positive."""
     array = np.array(given, dtype=float)
     if array.shape != (size,) or not np.isfinite(array).all() or not (array > 0.0).all():
         raise ValueError(f"{name} must be {size} numbers above 0")
@@ -91,8 +92,8 @@ def positive(given: Any, size: int, name: str) -> Array:
 
 
 def positive_definite(given: Any, size: int, name: str) -> Array:
-    """Return the weights, a matrix or its diagonal, as a symmetric array (size, size); ValueError, which calls them `name`,
-    where they are not symmetric and positive definite."""
+    """Return the weights, a matrix or its diagonal, as a symmetric array (size, size). Raise ValueError, with `name` in the
+    message, if they are not symmetric and positive definite."""
     array = np.array(given, dtype=float)
     if array.shape == (size,):
         array = np.diag(array)
@@ -101,7 +102,7 @@ def positive_definite(given: Any, size: int, name: str) -> Array:
     diagonal = np.diagonal(array)
     if (diagonal <= 0.0).any():
         raise ValueError(f"{name} must be positive definite; its diagonal holds {diagonal.min():g}")
-    # Scaled to a diagonal of ones, so that neither units nor large weights hide faults in small ones.
+    # Scaled to a unit diagonal, so that neither units nor large weights hide faults in small ones.
     root = np.sqrt(diagonal)
     scaled = array / root / root[:, None]
     if not np.abs(scaled - scaled.T).max() <= 1e-9:
@@ -113,17 +114,17 @@ def positive_definite(given: Any, size: int, name: str) -> Array:
 
 
 def spread(values: Array) -> Array:
-    """Return the largest over the smallest of the numbers along the first axis; what is below 1e-16 of the largest counts as
-    that."""
+    """Return the ratio of the largest to the smallest number along the first axis; numbers below 1e-16 of the largest count
+    as that."""
     most = values.max(axis=0)
     return most / np.maximum(values.min(axis=0), 1e-16 * most)
 
 
 def check_spreads(rate: Array, attitude: Array, cost: Array, *, kind: str = "") -> None:
-    """Raise ValueError where eigenvalues of q's rate part, of its attitude part or of r, each (3,), differ by more than
-    MOST_SPREAD; `kind` stands before the name in the message."""
+    """Raise ValueError if eigenvalues of q's rate part, of its attitude part or of r, each (3,), differ by a factor above
+    MOST_SPREAD; `kind` precedes the name in the message."""
     for name, part, values in (("q", "rate", rate), ("q", "attitude", attitude), ("r", "torque", cost)):
-        # Of a full matrix the least eigenvalue is known to the rounding of the largest: a thousandth is forgiven.
+        # The least eigenvalue of a full matrix has the rounding error of the largest: a thousandth is tolerated.
         factor = float(spread(values))
         if not factor <= 1.001 * MOST_SPREAD:
             reason = f"{kind}{name}: the weights of the {part} differ by a factor of {factor:.3g}"
@@ -131,8 +132,8 @@ def check_spreads(rate: Array, attitude: Array, cost: Array, *, kind: str = "") 
 
 
 def check_axes(moments: Array, q: Array, r: Array) -> None:
-    """Raise ValueError where weights q (6,), r (3,) differ about principal axes that only rounding tells apart; `moments`
-    (3,) are in rising order."""
+    """Raise ValueError if weights q (6,), r (3,) differ about principal axes that only rounding distinguishes; `moments`
+    (3,) are in ascending order."""
     for one, other in ((0, 1), (1, 2)):
         weights = np.array([q[:3], q[3:], r])
         if moments[other] - moments[one] <= SAME * moments[2] and (weights[:, one] != weights[:, other]).any():

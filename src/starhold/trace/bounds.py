@@ -1,8 +1,8 @@
-"""Bounds the work of a program: every address lies within its memory, and no more operations are done than are counted here.
+"""Bounds on a program: every address lies within its memory, and no more operations are executed than are counted here.
 
-Addresses are made of counts and counters alone, so they are polynomials in them. A polynomial that is linear in a
-counter is greatest at an end of the counter's range, which is a polynomial in the counters of the loops around: so the
-bounds are attained, but for some products of a counter with itself. Conditions on the counters hold in their branch or loop.
+Addresses are polynomials in counts and counters alone. A polynomial that is linear in a counter is greatest at an end of
+the counter's range, which is a polynomial in the counters of the enclosing loops: so the bounds are attained, except for
+some products of a counter with itself. Conditions on counters apply in their branch or loop.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from starhold.algebra.operations import INDEX
 from starhold.trace.program import Branch, Call, Function, Load, Loop, Op, Program, Store, Value
 
 Interval: TypeAlias = tuple[int, int]
-"""The lowest and the highest of some integers."""
+"""The lowest and the highest of a set of integers."""
 
 KINDS = {
     "additions": ("plus", "minus"),
@@ -34,15 +34,15 @@ KINDS = {
 """Operations by the field of `Work` that counts them."""
 _KIND = {name: kind for kind, names in KINDS.items() for name in names}
 _TRIED = 256
-"""Values of a counter that are tried one by one, where a polynomial is not linear in it."""
+"""Most values of a counter tried one by one where a polynomial is not linear in it."""
 
 
 class OutsideError(Exception):
-    """A load or a store may lie outside its memory; the text names the function, the address and the memory."""
+    """A load or a store may lie outside its memory; the message names the function, the address and the memory."""
 
 
 class Work(NamedTuple):
-    """The counts are upper bounds of how often each kind of operation is done."""
+    """Upper bounds on how often each kind of operation is executed."""
 
     additions: int = 0
     multiplications: int = 0
@@ -63,17 +63,16 @@ class Work(NamedTuple):
         return self.additions + self.multiplications + self.divisions + self.roots
 
     def plus(self, other: Work) -> Work:
-        """Add both."""
+        """Return the sum of both."""
         return Work(*(a + b for a, b in zip(self, other, strict=True)))
 
     def times(self, count: int) -> Work:
-        """Return this much work so many times over."""
+        """Return this work times `count`."""
         return Work(*(count * a for a in self))
 
 
 class Turns(NamedTuple):
-    """A loop that is not within another has a counter, a largest number of turns, and a bound of the work of one of
-    them."""
+    """An outermost loop: its counter, its largest number of iterations, and a bound on the work of one iteration."""
 
     counter: str
     most: int
@@ -81,8 +80,7 @@ class Turns(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """A program does at most so much work; its loops stand in order, with the lowest and the highest place that it uses of
-    each memory."""
+    """Bounds of a program: its work, its outermost loops in order, and the lowest and highest index used in each memory."""
 
     work: Work
     loops: tuple[Turns, ...]
@@ -90,21 +88,21 @@ class Bounds(NamedTuple):
 
 
 def work(program: Program, counts: Mapping[str, int | Interval]) -> Bounds:
-    """Return the bounds of a program for such counts, each a number or an interval, whatever the memories hold.
+    """Return the bounds of a program for the given counts, each a number or an interval, for any contents of the memories.
 
-    Work is that of plain Python and C, which do not ask whether a loop is done when its turns are used up."""
+    Work is counted as in plain Python and C, which do not test the end condition of a loop after its last iteration."""
     return _Walk(program, counts, None).bounds()
 
 
 def check(program: Program, counts: Mapping[str, int | Interval], sizes: Mapping[str, int]) -> Bounds:
-    """Bound the work as `work` does, where each memory holds so many numbers (for one lane). OutsideError where an address
-    may lie outside."""
+    """Return the bounds as `work` does. Raise OutsideError where an address may lie outside its memory of `sizes` numbers
+    (for one lane)."""
     known = {memory.name: memory.size for memory in program.memories if memory.size is not None}
     return _Walk(program, counts, {**known, **sizes}).bounds()
 
 
 class Form:
-    """A form is a polynomial with integer coefficients in symbols, which are numbered from the outside in."""
+    """A polynomial with integer coefficients in symbols, which are numbered from the outermost loop inwards."""
 
     __slots__ = ("terms",)
 
@@ -128,7 +126,7 @@ class Form:
         return Form(terms)
 
     def text(self, names: Sequence[str]) -> str:
-        """Return it in the names of the symbols, its number last."""
+        """Return it as text in the names of the symbols, the constant last."""
         terms: list[str] = []
         for symbols, c in sorted(self.terms.items(), key=lambda term: (not term[0], term[0])):
             factors = [names[symbol] for symbol in symbols]
@@ -144,7 +142,7 @@ class Form:
 
     @property
     def value(self) -> int:
-        """Return its value where it has no symbols."""
+        """Return its value; it must have no symbols."""
         return self.terms.get((), 0)
 
     def power(self, symbol: int) -> int:
@@ -152,12 +150,12 @@ class Form:
         return max((symbols.count(symbol) for symbols in self.terms), default=0)
 
     def slope(self, symbol: int) -> int | None:
-        """Return the coefficient of a symbol that it is linear in; None where that is not a number."""
+        """Return the coefficient of a symbol in which it is linear; None where the coefficient is not a number."""
         mixed = any(symbol in symbols and symbols != (symbol,) for symbols in self.terms)
         return None if mixed else self.terms.get((symbol,), 0)
 
     def at(self, symbol: int, value: Form) -> Form:
-        """Return the polynomial where a symbol is another polynomial."""
+        """Return the polynomial with a symbol replaced by another polynomial."""
         total = Form({})
         for symbols, c in self.terms.items():
             part = Form({tuple(s for s in symbols if s != symbol): c})
@@ -173,11 +171,11 @@ def constant(value: int) -> Form:
 
 
 Ranges: TypeAlias = dict[int, tuple[Form, Form]]
-"""The lowest and highest value of each symbol, in symbols further out."""
+"""The lowest and highest value of each symbol, as polynomials in symbols of enclosing loops."""
 
 
 def extreme(form: Form, ranges: Ranges, highest: bool) -> int:
-    """Return a bound of a polynomial: the highest or the lowest of its values, or beyond."""
+    """Return an upper (`highest`) or lower bound on the values of a polynomial."""
     symbol = form.last
     if symbol is None:
         return form.value
@@ -192,8 +190,8 @@ def extreme(form: Form, ranges: Ranges, highest: bool) -> int:
 
 
 def _by_intervals(form: Form, ranges: Ranges, highest: bool) -> int:
-    """Return a bound term by term, in the height of each symbol above its lowest value: that of a sum of terms of one
-    sign."""
+    """Return a bound term by term: the value at the lowest value of each symbol, plus every term that moves it outwards at
+    its largest."""
     above: dict[int, int] = {}
     for symbol in {symbol for symbols in form.terms for symbol in symbols}:
         low, high = extreme(ranges[symbol][0], ranges, False), extreme(ranges[symbol][1], ranges, True)
@@ -205,7 +203,7 @@ def _by_intervals(form: Form, ranges: Ranges, highest: bool) -> int:
 
 
 def required(form: Form, ranges: Ranges) -> Ranges | None:
-    """Return the ranges where a polynomial is not negative, as narrow as they are known to be; None where it always is."""
+    """Return the ranges narrowed by the condition that a polynomial is not negative; None where it is always negative."""
     if extreme(form, ranges, highest=True) < 0:
         return None
     symbol = form.last
@@ -226,7 +224,7 @@ def required(form: Form, ranges: Ranges) -> Ranges | None:
 
 
 class _Part(NamedTuple):
-    """A part sums up the work of a block each time, and the work done once in all the turns of the loop of a symbol."""
+    """Work of a block per execution, and work done once in all iterations of the loop of a symbol."""
 
     each: Work
     once: dict[int, Work]
@@ -273,7 +271,7 @@ class _Walk:
         total = _Part(Work(), {})
         for s in block:
             if isinstance(s, Op):
-                # What makes structs of numbers is no work.
+                # Operations that only group numbers into structs are not counted.
                 if (kind := _KIND.get(s.operation.name)) is not None:
                     total = total.plus(_Part(Work(**{kind: 1}), {}))
                 self._note(s, known)
@@ -289,7 +287,7 @@ class _Walk:
         return total
 
     def _note(self, s: Op, known: dict[str, Form]) -> None:
-        """Remember the form of an index, or for a comparison of two that of their difference."""
+        """Record the polynomial of an index, or for a comparison of two indices that of their difference."""
         if s.operation.name in ("index_plus", "index_minus", "index_product", "same_index"):
             a, b = (self._form(value, known) for value in s.args)
             if s.operation.name == "index_plus":
@@ -330,7 +328,7 @@ class _Walk:
         self.ranges = inside
         part = self._block(function, s.body, known)
         self.ranges = outer
-        # The branch is taken in one turn alone of the innermost loop whose counter it compares.
+        # The branch is taken in a single iteration of the innermost loop whose counter it compares.
         if off.last is not None and off.slope(off.last):
             everything = sum_of([part.each, *part.once.values()])
             return _Part(Work(), {off.last: everything})
@@ -358,7 +356,7 @@ class _Walk:
 
 
 def sum_of(parts: list[Work]) -> Work:
-    """Sum all of it up."""
+    """Return the sum."""
     total = Work()
     for part in parts:
         total = total.plus(part)

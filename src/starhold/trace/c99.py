@@ -1,8 +1,8 @@
-"""A program is printed as C99, for one lane: a function for each recorded one; the last is the one to call.
+"""Prints a program as C99, for one lane: a function for each recorded one, of which the last is to be called.
 
-It is given the memories as pointers, then counts as `long` and words as `uint64_t`. It uses nothing of the library but
-`sqrt` (and `memcpy`, where it takes doubles apart), allocates nothing, and gives the bits that plain Python gives where
-doubles are IEEE doubles and the compiler contracts nothing (`-std=c99 -ffp-contract=off`, never `-ffast-math`).
+Its arguments are the memories as pointers, then counts as `long` and words as `uint64_t`. From the library it uses only
+`sqrt` (and `memcpy`, to read the bits of doubles). It allocates nothing, and gives the bits of plain Python if doubles are
+IEEE doubles and the compiler contracts nothing (`-std=c99 -ffp-contract=off`, never `-ffast-math`).
 """
 
 from typing import Any, ClassVar
@@ -49,12 +49,12 @@ _HELPERS = {"bits_of": _BITS_OF, "with_bits": _WITH_BITS}
 
 
 def helpers(body: str) -> list[str]:
-    """Return the functions that a text in C calls to take doubles apart, and put them together; they need memcpy."""
+    """Return the functions called by a text in C to convert doubles to bits and back; they need memcpy."""
     return [text for name, text in _HELPERS.items() if f"{name}(" in body]
 
 
 class C99(Source):
-    """The printer makes the text of a program. A function returns its value, or writes several to pointers."""
+    """Printer of C99. A function with one result returns it; one with several writes them to pointers."""
 
     language = "c"
     special: ClassVar = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
@@ -87,7 +87,7 @@ class C99(Source):
         return f"{'' if main else 'static '}{gives} {self.titles[function.name]}({', '.join(given) or 'void'})"
 
     def _pointers(self, function: Function) -> list[str]:
-        """Return names of the pointers that a function's values are written to."""
+        """Return the names of the pointers to which a function writes its results."""
         used, mark = {*names(function), *self.titles.values(), *(memory.name for memory in self.program.memories)}, "out"
         count = len(function.outs)
         while not used.isdisjoint(f"{mark}{place}" for place in range(count)):

@@ -1,4 +1,4 @@
-"""One equation is compiled, to be called with numbers or over columns of them."""
+"""Compiles one equation, to be called with numbers or over columns of numbers."""
 
 from collections.abc import Callable, Iterator
 from functools import cached_property
@@ -21,8 +21,8 @@ WIDTH = 8
 
 
 class Compiled:
-    """An equation is compiled for arguments shaped like the given ones: their floats, also those in buffers, are
-    arguments, all else is a constant."""
+    """An equation compiled for arguments shaped like `like`: its floats, including those in buffers, are arguments, and all
+    else is constant."""
 
     def __init__(self, equation: Callable[..., Any], *like: Any) -> None:
         self.program, self._like = record_call(equation, like)
@@ -38,7 +38,7 @@ class Compiled:
         return load(self.program, WIDTH)
 
     def __call__(self, *values: Any) -> Any:
-        """Call the equation with numbers; the result is shaped as the equation gives it."""
+        """Return the result of the equation for these values, in the shape of the equation's result."""
         x = np.array(list(_floats(values)))
         y = np.empty(len(self._leaves))
         self._one(x.ctypes.data, y.ctypes.data, 1)
@@ -46,7 +46,7 @@ class Compiled:
         return mapped(self._like, lambda leaf: _plain(leaf, next(source)))
 
     def over(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the numbers it gives, (numbers, lanes), for arguments whose floats are the columns of (floats, lanes);
+        """Return the results (numbers, lanes) for arguments whose floats are the columns of an array (floats, lanes);
         truths are 1 and 0."""
         count = columns.shape[1]
         blocks = -(-count // WIDTH)
@@ -64,8 +64,8 @@ def _plain(leaf: Any, number: float) -> Any:
 
 
 def record_call(equation: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Program, Any]:
-    """Return a program that reads the floats of the arguments from the memory `x` and writes the equation's numbers to
-    `y`, both `count` times over; and the equation's result, with handles for numbers."""
+    """Return a program that reads the floats of the arguments from the memory `x` and writes the equation's results to `y`,
+    for `count` sets of arguments; and the equation's result, with handles for numbers."""
     recorder = Recorder()
     x = recorder.memory("x", lanes=True)
     y = recorder.memory("y", lanes=True, writable=True)
@@ -86,7 +86,7 @@ def record_call(equation: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Pr
 
 
 def bind(like: Any, cells: Cells, base: Any = 0) -> Any:
-    """Rebuild the structure with its floats read from memory, from `base` on, in order; its buffers lie there too."""
+    """Return the structure with its floats and buffers in memory from `base` on, in order."""
     place = 0
 
     def leaf(value: Any) -> Any:

@@ -1,6 +1,6 @@
 """Programs run on the first NVIDIA GPU of this machine by its driver: each thread is a lane, each number has a row of lanes.
 
-The driver makes code of the printed text. Its operations round to nearest, and none may be fused with another.
+The driver compiles the printed text, whose operations round to nearest and may not be fused.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from starhold.trace.ptx import ptx
 Array: TypeAlias = NDArray[np.float64]
 
 THREADS = 128
-"""Threads of a block."""
+"""Threads per block."""
 OLDEST = 80
 """The first architecture for which the text is printed: 80 for sm_80, an A100."""
 _WHOLE = 0xFFFFFFFFFFFFFFFF
 
 
 class Rows:
-    """Rows (numbers, lanes) in the memory of a GPU; that is given back when nobody refers to them."""
+    """Rows (numbers, lanes) in the memory of a GPU, which is freed when the object is deleted."""
 
     def __init__(self, device: Device, numbers: int, lanes: int) -> None:
         self.shape, self._device = (numbers, lanes), device
         self.address = int(device.call("cuMemAlloc", max(8, self.size)))
-        # At its end the process gives back all.
+        # The process frees everything at its end.
         weakref.finalize(self, device.call, "cuMemFree", self.address).atexit = False
 
     @property
@@ -45,13 +45,13 @@ class Rows:
         return self.address + 8 * self.shape[1] * number
 
     def fill(self, rows: Array, first: int = 0) -> None:
-        """Put rows (numbers, lanes) there, from the row `first` on."""
+        """Copy rows (numbers, lanes) there, from the row `first` on."""
         given = np.ascontiguousarray(rows, dtype=np.float64)
         if given.size:
             self._device.call("cuMemcpyHtoD", self.row(first), given.ctypes.data, given.nbytes)
 
     def read(self) -> Array:
-        """Return the numbers, once all that was begun before is done."""
+        """Return the numbers (numbers, lanes), after all earlier work has finished."""
         numbers = np.empty(self.shape)
         if numbers.size:
             self._device.call("cuMemcpyDtoH", numbers.ctypes.data, self.address, numbers.nbytes)
@@ -59,7 +59,7 @@ class Rows:
 
 
 class Device:
-    """The first GPU. InputError, in one line, where there is none that can fly."""
+    """The first GPU. Raises InputError if there is no usable one."""
 
     def __init__(self) -> None:
         self._driver = optional("cuda.bindings.driver", user="gpu", bundle="gpu")
@@ -80,7 +80,7 @@ class Device:
         self._kernels: dict[int, tuple[Program, Any]] = {}
 
     def call(self, name: str, *given: Any) -> Any:
-        """Return what a function of the driver gives, None for nothing. DeviceError where it fails."""
+        """Return the result of a function of the driver, None if it has none. Raise DeviceError where it fails."""
         code, *results = getattr(self._driver, name)(*given)
         if int(code):
             raise DeviceError(f"{name}: {getattr(code, 'name', int(code))}")
@@ -99,18 +99,18 @@ class Device:
         return self._kernels[id(program)][1]
 
     def rows(self, values: Array) -> Rows:
-        """Return rows with these values (numbers, lanes)."""
+        """Return rows on the GPU with these values (numbers, lanes)."""
         made = Rows(self, *values.shape)
         made.fill(values)
         return made
 
     def begin(self, program: Program, memories: Mapping[str, Rows], counts: Sequence[int], lanes: int) -> None:
-        """Begin to run a program on rows, after all that was begun before."""
+        """Start a program on rows; it runs after all earlier work."""
         addresses = [memories[memory.name].address for memory in program.memories]
         given = np.array([*addresses, *(count & _WHOLE for count in counts), lanes], dtype=np.uint64)
         places = given.ctypes.data + 8 * np.arange(len(given), dtype=np.uint64)
         blocks = -(-lanes // THREADS)
-        # What the places point to is copied before this returns.
+        # The arguments are copied before this returns.
         self.call("cuLaunchKernel", self.load(program), blocks, 1, 1, THREADS, 1, 1, 0, 0, places.ctypes.data, 0)
 
 

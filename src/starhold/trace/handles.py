@@ -1,5 +1,5 @@
-"""Handles take the place of values while equations are recorded; they note the operations on them, and refuse what cannot be
-noted."""
+"""Handles stand for values while equations are recorded; they record operations and refuse those that cannot be
+recorded."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ INSTEAD = f"+ - * /, sqrt and the other operations of starhold.algebra.scalar, {
 
 
 class RecordingError(InputError):
-    """An equation cannot be recorded; the text names the law, the line of its file and what to write instead."""
+    """An equation cannot be recorded; the message names the law, the line of its file and what to write instead."""
 
 
 class Handle:
-    """A handle stands in place of a value while an equation is recorded."""
+    """A handle stands for a value while an equation is recorded."""
 
     __slots__ = ("recorder", "ref")
     reader = "record"
@@ -108,7 +108,7 @@ def _binary(name: str, turned: bool = False) -> Any:
 
 
 class Number(Handle):
-    """This handle stands for a number."""
+    """A handle that stands for a number."""
 
     __slots__ = ()
     kind = NUMBER
@@ -125,21 +125,21 @@ class Number(Handle):
 
 
 class Truth(Handle):
-    """A truth is the result of a comparison."""
+    """A handle that stands for the result of a comparison."""
 
     __slots__ = ()
     kind = TRUTH
 
 
 class Word(Handle):
-    """This handle stands for a 64-bit unsigned integer."""
+    """A handle that stands for a 64-bit unsigned integer."""
 
     __slots__ = ()
     kind = WORD
 
 
 class Index(Handle):
-    """All lanes share this integer: a count, a loop's counter, or a sum, difference or product of these."""
+    """An integer shared by all lanes: a count, a loop's counter, or a sum, difference or product of these."""
 
     __slots__ = ()
     kind = INDEX
@@ -149,7 +149,7 @@ class Index(Handle):
 
 
 class Uniform(Handle):
-    """All lanes share this truth about indices."""
+    """A truth about indices, shared by all lanes."""
 
     __slots__ = ()
     kind = UNIFORM
@@ -159,7 +159,7 @@ HANDLES: dict[str, type[Handle]] = {cls.kind: cls for cls in (Number, Truth, Wor
 
 
 def refuse(what: str, allowed: str) -> NoReturn:
-    """Raise a RecordingError that points at the line of the equation that runs now."""
+    """Raise a RecordingError that names the line of the equation that runs now."""
     place, text = written_at()
     raise RecordingError(place, "", f"{what}, in `{text}`", allowed)
 
@@ -176,11 +176,11 @@ def kind_of(value: Any) -> str:
 
 
 SHORTENED = frozenset(("both", "either", "same_index", "index_plus", "index_minus", "index_product"))
-"""Operations that a known value may decide."""
+"""Operations whose result may follow from one known operand."""
 
 
 def shortened(name: str, values: tuple[Any, ...], refs: Sequence[Any]) -> Any:
-    """Return what an operation gives where a known value decides it; None where none does."""
+    """Return the result of an operation that follows from a known operand; None where none does."""
     if name in ("both", "either"):
         known = next((value for value in values if isinstance(value, bool)), None)
         if known is None:

@@ -1,7 +1,7 @@
-"""A program is printed as JavaScript (ES2017), for one lane: a function for each recorded one; the last is the one to call.
+"""Prints a program as JavaScript (ES2017), for one lane: a function for each recorded one; the last is to be called.
 
-It is given the memories as Float64Arrays, then counts as numbers and words as pairs [high, low] of 32-bit integers, as
-words are everywhere here. It needs neither a library nor a module, and gives the bits that plain Python gives.
+Its arguments are the memories as Float64Arrays, then counts as numbers and words as pairs [high, low] of 32-bit integers,
+which is the form of words everywhere here. It needs no library and no module, and gives the bits of plain Python.
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ function with_bits(high, low) {
 
 
 class JavaScript(Source):
-    """The printer makes the text of a program. A function gives a value, or an array of them where there are more."""
+    """Printer of JavaScript. A function returns its result, or an array of several."""
 
     language = "javascript"
     special: ClassVar = {"nan": "NaN", "inf": "Infinity", "-inf": "-Infinity"}
@@ -72,11 +72,11 @@ class JavaScript(Source):
         return "let" if changes else "const"
 
     def _parts(self, name: str, kind: str) -> list[str]:
-        # No name of a trace holds a dollar.
+        # No name of a trace contains a dollar sign.
         return [f"{name}$high", f"{name}$low"] if kind == WORD else [name]
 
     def _texts_of_parts(self, value: Value, kind: str) -> list[str]:
-        """Return the texts of a value: for a word that of each half."""
+        """Return the texts of a value: one, or for a word one per half."""
         if kind != WORD:
             return [self.text(value, kind)]
         if isinstance(value, str):
@@ -117,6 +117,6 @@ class JavaScript(Source):
 
 
 def _signed(half: int) -> int:
-    """Return thirty-two bits as a signed integer, which operators on bits give."""
+    """Return 32 bits as a signed integer, as bitwise operators of JavaScript do."""
     half &= 0xFFFFFFFF
     return half - (1 << 32) if half >= 1 << 31 else half

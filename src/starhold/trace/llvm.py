@@ -1,7 +1,7 @@
-"""A program is printed as LLVM's intermediate representation, for one lane or for W lanes in explicit vectors.
+"""Prints a program as LLVM's intermediate representation, for one lane or for W lanes in explicit vectors.
 
-No operation is reassociated or contracted. Lanes go through loops together: a lane that is done keeps what its slots
-hold and writes nothing, by masks.
+No operation is reassociated or contracted. Lanes execute loops together: masks let a lane that has finished keep its loop
+variables and write nothing.
 """
 
 import struct
@@ -14,7 +14,7 @@ ATTRIBUTES = 'attributes #0 = { nounwind "prefer-vector-width"="512" "min-legal-
 
 
 def hexadecimal(number: float) -> str:
-    """Return the bits of a double, as LLVM writes a constant of any value."""
+    """Return a double in hexadecimal, as LLVM writes constants."""
     return "0x" + struct.pack(">d", number).hex().upper()
 
 
@@ -25,7 +25,7 @@ def check_apart(program: Program) -> None:
 
 
 class Types:
-    """Types and constants have these names for so many lanes."""
+    """Names of types and constants for a number of lanes."""
 
     def __init__(self, width: int, lane: str = "0") -> None:
         self.width = width
@@ -56,17 +56,17 @@ class Types:
 
 
 def _width(s: Call) -> int:
-    """Return the width of the vectors that a call of several rows takes."""
+    """Return the width of the vectors in a call over several rows."""
     return 1 << (s.rows - 1).bit_length()
 
 
 class Llvm:
-    """The printer makes the text of a program. Memories are pointers: a memory of lanes holds W numbers for each index."""
+    """Printer of LLVM's representation. Memories are pointers: a memory of lanes has W numbers for each index."""
 
     convention: ClassVar[str] = ""
-    """Calling convention of the function to run, where it is not C's."""
+    """Calling convention of the main function, if it is not that of C."""
     passed: ClassVar[tuple[str, ...]] = ()
-    """Integers that are the last arguments of every function."""
+    """Names of integers that are the last arguments of every function."""
     lane: ClassVar[str] = "0"
     """The number of the lane where there is only one."""
 
@@ -119,7 +119,7 @@ class Llvm:
         return f"{self.types.names[kind]} {self._value(value, kind)}"
 
     def _splat(self, single: str, value: str, kind: str, name: str | None = None) -> str:
-        """Return a value for all lanes from one that they share."""
+        """Return a value that all lanes share as a vector with one element for each lane."""
         name = name or self._new()
         if self.types.width == 1:
             self._put(f"{name} = bitcast {single} {value} to {single}")
@@ -151,7 +151,7 @@ class Llvm:
         main = function is self.program.main
         if main:
             self._begin(function)
-        # Vectors of several rows: where each of their numbers is, what is there before the first loop, and vectors of that.
+        # Vectors of several rows: the place of each number, the numbers known before the first loop, and vectors of those.
         self.places, self.vectors = dict[Value, tuple[str, int, int]](), dict[Any, str]()
         begin = next((k for k, s in enumerate(function.body) if isinstance(s, Loop)), 0)
         self.early = {s.ref for s in function.body[:begin] if isinstance(s, (Op, Load))}
@@ -174,7 +174,7 @@ class Llvm:
                 self._splat("i64", f"%{name}.given", WORD, f"%{name}")
 
     def _rows(self, s: Call) -> None:
-        """Do the operations of a function of numbers on vectors of rows."""
+        """Print the operations of a function of numbers on vectors of rows."""
         single, self.types = self.types, Types(_width(s))
         names: dict[Value, str] = {}
         for k, (name, kind) in enumerate(s.function.params):
@@ -200,7 +200,7 @@ class Llvm:
             wide = many.replace(f"<{width} ", f"<{sources[0][2]} ")
             mask = ", ".join([f"i32 {row}" for row in rows] + ["i32 poison"] * (width - len(rows)))
             return self._let(f"shufflevector {wide} {vector}, {wide} poison, <{width} x i32> <{mask}>")
-        # What does not change in the loops is put together before them.
+        # Vectors that do not change in loops are assembled before them.
         early = all(not isinstance(x, str) or x in self.early for x in values)
         if early and (values, kind) in self.vectors:
             return self.vectors[values, kind]
@@ -296,7 +296,7 @@ class Llvm:
 
     def _loop(self, s: Loop, mask: str | None) -> None:
         at, truth, yes = self._new()[2:], self.types.names[TRUTH], self.types.fields["yes"]
-        # Lanes that are not done yet; on one lane the branch says it.
+        # Lanes that have not finished; on one lane the branch tests this.
         narrows = s.done is not None and self.types.width > 1
         on, before = f"%.on{at}", mask or yes
         first = self.label

@@ -1,4 +1,4 @@
-"""Programs are compiled for this processor and called."""
+"""Compiles programs for this processor and loads them."""
 
 import ctypes
 from collections.abc import Callable
@@ -19,7 +19,7 @@ ALIGNMENT = 64
 
 @cache
 def _llvm() -> Any:
-    """Return the library, loaded when the first kernel is compiled."""
+    """Return llvmlite, loaded when the first kernel is compiled."""
     llvm: Any = import_module("llvmlite.binding")
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
@@ -27,49 +27,50 @@ def _llvm() -> Any:
 
 
 def _machine() -> Any:
-    """Return this processor, with all it can do. An engine takes the description over, so each needs its own."""
+    """Return a target machine for this processor with all features. An engine takes ownership, so each needs its own."""
     llvm = _llvm()
     target, features = llvm.Target.from_default_triple(), llvm.get_host_cpu_features().flatten()
     return target.create_target_machine(opt=3, cpu=llvm.get_host_cpu_name(), features=features)
 
 
 LONG = 2_000_000
-"""Control steps of one lane for which it pays that LLVM optimises their kernel."""
+"""Control steps of one lane from which it pays to let LLVM optimise the kernel."""
 FEW, MANY = 16, 48
-"""Numbers carried from step to step up to which 16 and 32 registers are still enough for two vectors of each."""
+"""Numbers carried from step to step up to which 16 and 32 registers, respectively, suffice for two vectors of each."""
 
 
 def widest(carried: int, noted: int = 0) -> int:
-    """Return the fastest number of lanes in flight at once on this processor, where each carries so many numbers and has so
-    many notes: two of the widest registers for a number where there are few numbers, or where there are 32 of them, not
-    many numbers, and nothing is noted; else one."""
+    """Return the fastest number of simultaneous lanes on this processor, for lanes that carry `carried` numbers and record
+    `noted`. It fills two of the widest registers per number if few are carried (with 32 registers, up to `MANY` and nothing
+    recorded); else one."""
     if _is_wide():
         return 8 if noted or carried > MANY else 16
     return 8 if carried + noted <= FEW else 4
 
 
 def _is_wide() -> bool:
-    """Return whether there are 32 registers of 512 bits."""
+    """Return whether this processor has 32 registers of 512 bits."""
     return bool(_llvm().get_host_cpu_features().get("avx512f"))
 
 
 def load(program: Program, width: int, passes: bool | None = None) -> Callable[..., None]:
-    """Return the program as a function of this process, for so many lanes at once: addresses of the memories (a memory
-    of lanes holds `width` numbers for each index, aligned to their size), then counts and words. It releases the GIL.
+    """Return the program as a function for `width` lanes at once. Its arguments are the addresses of the memories (a memory
+    of lanes has `width` numbers for each index, aligned to their size), then counts and words. It releases the GIL.
 
-    passes: whether LLVM optimises the printed text before it makes code of it; None: where that has been measured to
-    pay, on many lanes where registers are plenty and nothing is called. On one lane it takes longer than the code itself
-    for some thousandths of the time of a step, or a fifth where matrices are solved: it pays from `LONG` steps on."""
+    passes: whether LLVM optimises the printed text before it generates code; None: where measurements say that it pays,
+    which is on many lanes if registers are plentiful and nothing is called. On one lane it takes longer than code
+    generation and saves some thousandths of the time of a step, or a fifth where matrices are solved: it pays from `LONG`
+    steps on."""
     calls = any(isinstance(s, Call) and s.rows == 1 for s in statements(program.main.body))
     if passes is None:
         passes = width > 1 and _is_wide() and not calls
     llvm, machine = _llvm(), _machine()
-    # Of many lanes, and of a law that solves an optimization, other things take the time.
+    # With many lanes, or a law that solves an optimization, the time is spent elsewhere.
     module = llvm.parse_assembly(str(Llvm(program if width > 1 or calls else ordered(program), width)))
     module.verify()
     if passes:
         options = llvm.create_pipeline_tuning_options(speed_level=3)
-        # It pays for the matrices of a law that solves an optimization, and costs where vectors have three components.
+        # It pays for the matrices of a law that solves an optimization, and costs time on vectors of three components.
         options.slp_vectorization = width == 1 and calls
         builder = llvm.create_pass_builder(machine, options)
         builder.getModulePassManager().run(module, builder)
@@ -83,7 +84,7 @@ def load(program: Program, width: int, passes: bool | None = None) -> Callable[.
 
 
 def aligned(*shape: int) -> NDArray[np.float64]:
-    """Return an array of zeros that begins where a whole vector may be read at once."""
+    """Return an array of zeros aligned so that a whole vector may be read at once."""
     size = int(np.prod(shape))
     step = max(ALIGNMENT, 8 * shape[-1]) // 8 if shape else 8
     store = np.zeros(size + step)

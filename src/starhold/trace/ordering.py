@@ -1,8 +1,8 @@
-"""The order of a program's statements in which a processor waits least for results.
+"""Orders a program's statements so that a processor waits least for results.
 
-An equation is recorded operation by operation, so that in long stretches each waits for the one before. A processor looks
-some hundreds of operations ahead; here as many more are looked through, and of what is ready the first comes first. The
-operations, and so the bits, stay as they are.
+An equation is recorded operation by operation, so in long stretches each waits for the one before. A processor looks some
+hundreds of operations ahead; here a window of as many more is searched, and the first operation that is ready comes next.
+The operations, and so the bits, are unchanged.
 """
 
 from heapq import heapify, heappop, heappush
@@ -11,18 +11,18 @@ from typing import Any
 from starhold.trace.program import Block, Branch, Call, Load, Loop, Op, Program, Store, reads, results, statements
 
 WINDOW, WIDTH = 400, 3
-"""How many statements from the first one that waits are looked through, for what is made early needs a register until it is
-used; and how many operations begin in a cycle."""
+"""How many statements are searched from the first one that waits (an early result needs a register until it is used), and
+how many operations begin in a cycle."""
 CROWDED = 80
-"""So many results that wait for their use, on average, leave no room for more: their block stays as it is."""
+"""Average number of results waiting for use above which registers are full, and the block keeps its order."""
 LATENCIES = {"product": 3, "plus": 3, "minus": 3, "less": 3, "less_equal": 3, "select": 2, "divide": 13, "sqrt": 21}
-"""Cycles in which present processors do an operation on numbers; one for all others."""
+"""Latencies of operations on numbers on present processors, in cycles; all others have one."""
 ROWS, AROUND = 9, 60
-"""Cycles of a call of several rows, and of a loop within the block."""
+"""Cycles assumed for a call over several rows, and for a loop within the block."""
 
 
 def ordered(program: Program) -> Program:
-    """Return the program with the statements of each block of its main function in such an order."""
+    """Return the program with the statements of each block of its main function reordered."""
     main = program.main
     return program._replace(functions=(*program.functions[:-1], main._replace(body=_ordered(main.body))))
 
@@ -44,7 +44,7 @@ def _ordered(block: Block) -> Block:
         else:
             makers.update((name, place) for name, _ in results(s))
             if _touches(s):
-                # What reads and writes memory keeps its order.
+                # Statements that read or write memory keep their order.
                 before |= {last} - {-1}
                 last = place
         missing[place] = len(before)
@@ -84,7 +84,7 @@ def _touches(s: Any) -> bool:
 
 
 def _cost(s: Any) -> tuple[int, int]:
-    """Return how many operations a statement is, and in how many cycles it is done."""
+    """Return the number of operations of a statement, and its latency in cycles."""
     if isinstance(s, Op):
         return 1, LATENCIES.get(s.operation.name, 1)
     if isinstance(s, Call):

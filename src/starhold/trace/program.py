@@ -1,4 +1,4 @@
-"""A trace is a tree of blocks. A block is a list of operations, stores, loops, branches and calls."""
+"""A trace is a tree of blocks; a block is a list of operations, loads, stores, loops, branches and calls."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Value: TypeAlias = Any
 
 
 class Op(NamedTuple):
-    """The operation sets ref = operation(args)."""
+    """An operation: ref = operation(args)."""
 
     ref: str
     operation: Operation
@@ -21,7 +21,7 @@ class Op(NamedTuple):
 
 
 class Load(NamedTuple):
-    """The load sets ref = memory[index]."""
+    """A load: ref = memory[index]."""
 
     ref: str
     memory: str
@@ -29,7 +29,7 @@ class Load(NamedTuple):
 
 
 class Store(NamedTuple):
-    """The store sets memory[index] = value."""
+    """A store: memory[index] = value."""
 
     memory: str
     index: Value
@@ -37,8 +37,8 @@ class Store(NamedTuple):
 
 
 class Slot(NamedTuple):
-    """A variable of a loop is called `name` within it and `name` with an underscore after it; `before` is its value
-    before the first turn, `after` its value after each turn."""
+    """A variable of a loop, called `name` in the loop and `name_` after it; `before` is its value before the first
+    iteration, `after` its value at the end of each."""
 
     name: str
     kind: str
@@ -47,12 +47,13 @@ class Slot(NamedTuple):
 
     @property
     def end(self) -> str:
-        """Return its name after the loop."""
+        """The name of its value after the loop."""
         return self.name + "_"
 
 
 class Loop(NamedTuple):
-    """Repeat the body at most so many times; with `done`, until that holds at the start of a turn, which `head` computes."""
+    """A loop repeats the body at most `most` times, or until `done`, which `head` computes, holds at the start of an
+    iteration."""
 
     counter: str
     most: Value
@@ -63,15 +64,15 @@ class Loop(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """Run the body where a truth that all lanes share holds."""
+    """A branch runs the body if a truth that all lanes share holds."""
 
     truth: Value
     body: tuple[Any, ...]
 
 
 class Call(NamedTuple):
-    """The call sets refs = function(args). Of several rows it is the function of each, all at once in short vectors: what a
-    parameter is in each row comes together in args, and what a result is in each in refs."""
+    """A call: refs = function(args). A call over several rows applies the function to each, all at once in short vectors:
+    args has the values of a parameter in all rows side by side, and refs those of a result."""
 
     refs: tuple[tuple[str, str], ...]
     function: Function
@@ -83,8 +84,8 @@ Block: TypeAlias = tuple[Any, ...]
 
 
 class Function(NamedTuple):
-    """A function is a block of its own; params and outs are pairs of a name (or constant) and a kind; shape: how
-    printers group them."""
+    """A function: a block, its parameters and results as pairs of a name (or constant) and a kind; shape: how printers
+    group them."""
 
     name: str
     doc: str
@@ -95,7 +96,7 @@ class Function(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """A memory holds the numbers that a program is given: a block for each lane, or one for all; size, where it is known."""
+    """Memory passed to a program: a block of numbers for each lane, or one for all; `size` if it is known."""
 
     name: str
     lanes: bool
@@ -104,15 +105,14 @@ class Memory(NamedTuple):
 
 
 class Program(NamedTuple):
-    """A program has functions in the order of their definition, of which the last is run, and the memories it is given,
-    in order."""
+    """A program: its functions in order of definition, of which the last is run, and its memories in order."""
 
     functions: tuple[Function, ...]
     memories: tuple[Memory, ...]
 
     @property
     def main(self) -> Function:
-        """The last function is the one that is run."""
+        """The function that is run, which is the last."""
         return self.functions[-1]
 
     def memory(self, name: str) -> Memory:
@@ -134,7 +134,7 @@ def statements(block: Block) -> Iterator[Any]:
 
 
 def results(s: Any) -> list[tuple[str, str]]:
-    """Return the names and kinds of what a statement makes."""
+    """Return the names and kinds of a statement's results."""
     if isinstance(s, Op):
         return [(s.ref, s.operation.gives)]
     if isinstance(s, Load):
@@ -143,7 +143,7 @@ def results(s: Any) -> list[tuple[str, str]]:
 
 
 def reads(block: Block) -> Iterator[Value]:
-    """Return the names that a block reads, with repetitions, and constants."""
+    """Return the names and constants that a block reads, with repetitions."""
     for s in statements(block):
         if isinstance(s, (Op, Call)):
             yield from s.args
@@ -163,10 +163,10 @@ def writes(block: Block) -> bool:
 
 
 def prune(block: Block, outs: Iterable[Value]) -> tuple[Block, dict[str, Value]]:
-    """Return the block without operations and slots that nobody reads, and with slots that never change replaced by
-    their values; and the values that stand for their names now."""
+    """Return the block without operations and slots that are never read, and with slots that never change replaced by their
+    values; and the values that replace their names."""
     wanted, names = set(outs), dict[str, Value]()
-    # A loop within may show that a slot of the loop round it never changes either.
+    # An inner loop may show that a slot of the outer loop never changes either.
     while any(_settles(slot) for s in statements(block) if isinstance(s, Loop) for slot in s.slots):
         settled: dict[str, Value] = {}
         block = _settled(block, settled)
@@ -176,8 +176,8 @@ def prune(block: Block, outs: Iterable[Value]) -> tuple[Block, dict[str, Value]]
 
 
 def single_turns(function: Function) -> Function:
-    """Return the function with the slots of loops of one turn replaced by their values: such a loop is a branch, and
-    values that only its slots read are gone."""
+    """Return the function with the slots of loops of one iteration replaced by their values: such a loop is a branch, and
+    values read only by its slots are removed."""
     names: dict[str, Value] = {}
     for s in statements(function.body):
         if isinstance(s, Loop) and s.most == 1:
@@ -194,7 +194,7 @@ def renamed(value: Value, names: dict[str, Value]) -> Value:
 
 
 def _settled(block: Block, names: dict[str, Value]) -> Block:
-    """Return the block with settled slots replaced by the values in `names`, which grows."""
+    """Return the block with slots that never change replaced by their values, which are added to `names`."""
     result: list[Any] = []
     for s in block:
         if isinstance(s, (Op, Call)):
@@ -219,13 +219,13 @@ def _settled(block: Block, names: dict[str, Value]) -> Block:
 
 
 def _settles(slot: Slot) -> bool:
-    """Return whether each turn hands a slot on as it is."""
+    """Return whether no iteration changes a slot."""
     after, before = slot.after, slot.before
     return after == slot.name or (not isinstance(after, str) and type(after) is type(before) and repr(after) == repr(before))
 
 
 def live_names(block: Block, outs: Iterable[Value]) -> set[Value]:
-    """Return what is read for the sake of the outs, or of what is written."""
+    """Return the names on which the results, or anything written to memory, depend."""
     makers, names, todo = dict[Value, tuple[Value, ...]](), set[Value](), [*outs]
     for s in statements(block):
         if isinstance(s, Loop):
@@ -254,7 +254,7 @@ def _refs(s: Op | Load | Call) -> list[str]:
 
 
 def pruned(block: Block, names: set[Value]) -> Block:
-    """Return the block without what gives none of these names."""
+    """Return the block without statements that compute none of these names."""
     result: list[Any] = []
     for s in block:
         if isinstance(s, Loop):

@@ -1,8 +1,8 @@
-"""A program is printed as assembly of another machine, from the same intermediate representation: PTX of NVIDIA's GPUs,
-where each thread is a lane, and of any processor that LLVM knows, for one lane.
+"""Prints a program as assembly of another machine, from the same intermediate representation: PTX for NVIDIA's GPUs, where
+each thread is a lane, or assembly for any processor that LLVM supports, for one lane.
 
-No test runs it on a GPU. The text for LLVM is run on the processor at hand, one thread after the other. The PTX that
-LLVM makes of it is checked, every operation rounds to nearest and none is fused, and run by a reader of PTX.
+No test runs it on a GPU. Tests run the text for LLVM on this processor, one thread after the other. They check that every
+operation of the PTX rounds to nearest and none is fused, and run it in an interpreter of PTX.
 """
 
 from importlib import import_module
@@ -17,10 +17,10 @@ _REGISTERS = ("tid.x", "ctaid.x", "ntid.x")
 
 
 class Threads(Llvm):
-    """The lanes of this program are the threads of a kernel; threads beyond the number of lanes do nothing.
+    """Printer of a GPU kernel whose threads are the lanes; threads beyond the number of lanes do nothing.
 
-    It is given the memories (a memory of lanes holds a number of each lane for each index), counts and words, and last the
-    number of lanes, which may be started in blocks along x of any size."""
+    Its arguments are the memories (a memory of lanes has one number per lane for each index), counts and words, and last
+    the number of lanes. Blocks along x may have any size."""
 
     convention = "ptx_kernel "
     passed = ("%.lanes", "%.thread")

@@ -1,4 +1,4 @@
-"""Operations on handles are recorded as a tree of blocks."""
+"""Records operations on handles as a tree of blocks."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ _WORDS = """
     bits_of with_bits high_bits low_bits
 """
 RESERVED = frozenset(_WORDS.split())
-"""Words of the printed languages, which no variable may have for a name."""
+"""Reserved words of the printed languages, which no variable may have as its name."""
 
 
 MARK = "\u241e"
-"""The delimiter on both sides of a number's index and format in a text that a check makes from recorded numbers."""
+"""The delimiter around a number's index and format in a message that a check composes from recorded numbers."""
 
 _CONSTANTS = {NUMBER: (float, int), TRUTH: (bool,), WORD: (int,), INDEX: (int,), STATIC: (int,)}
 
@@ -53,7 +53,7 @@ def _ref(value: Any) -> Value:
 
 
 class Cells:
-    """The cells of a buffer lie in a memory of the trace."""
+    """The cells of a buffer in a memory of the trace."""
 
     def __init__(self, recorder: Recorder, memory: Memory) -> None:
         self.recorder, self.memory = recorder, memory
@@ -66,13 +66,13 @@ class Cells:
 
 
 class _Names:
-    """Every variable gets a name of its own."""
+    """Unique names for variables."""
 
     def __init__(self, taken: Iterable[str], mark: str = "") -> None:
         self._mark, self._taken, self._counts = mark, {*taken, *RESERVED}, Counter[str]()
 
     def new(self, hint: str) -> str:
-        """Return the hint, with a number where it is taken. None ends in an underscore, which marks values after a loop."""
+        """Return the hint, numbered if it is taken. No name ends in an underscore, which marks values after a loop."""
         name = hint = (hint.strip("_") or "x") + self._mark
         while name in self._taken or name == "t":
             self._counts[hint] += 1
@@ -82,8 +82,8 @@ class _Names:
 
 
 class Path:
-    """One path through the comparisons of a check: the given answers, then no to all others. `truths` and `taken` are the
-    comparisons met with their answers; `numbers` those that appear in a text."""
+    """One path through the comparisons of a check: the given answers, then False for all others. `truths` and `taken` are
+    the comparisons met and their answers; `numbers` those that appear in a message."""
 
     def __init__(self, turns: Sequence[bool]) -> None:
         self.taken, self._turns = list[bool](), turns
@@ -99,13 +99,13 @@ class Path:
         return self.taken[-1]
 
     def shown(self, number: Handle, spec: str) -> str:
-        """Return a mark in the place of a number in a text, as `refusals` reads it."""
+        """Return the mark that stands for a number in a message, as `refusals` reads it."""
         self.numbers.append(number)
         return f"{MARK}{len(self.numbers) - 1}:{spec}{MARK}"
 
 
 class Recorder:
-    """A recorder keeps operations on handles as a tree of blocks, with equal operations kept once."""
+    """A recorder builds a tree of blocks from operations on handles; equal operations are recorded once."""
 
     by_rows = False
     """Whether `each` and `folded` of `algebra.several` are recorded for several rows at once."""
@@ -123,12 +123,12 @@ class Recorder:
         self._inputs: list[tuple[str, str]] = []
 
     def input(self, name: str, kind: str) -> Any:
-        """Return a count (`index`) or a `word` that the program is given."""
+        """Return an argument of the program: a count (`index`) or a `word`."""
         self._inputs.append((self._names.new(name), kind))
         return HANDLES[kind](self, self._inputs[-1][0])
 
     def memory(self, name: str, *, lanes: bool = False, writable: bool = False, size: int | None = None) -> Cells:
-        """Return memory that the program is given."""
+        """Return a memory that is an argument of the program."""
         self.memories.append(Memory(self._names.new(name), lanes, writable, size))
         return Cells(self, self.memories[-1])
 
@@ -142,7 +142,7 @@ class Recorder:
 
     @contextmanager
     def recording(self) -> Generator[None]:
-        """Let the structured forms of `algebra.structured` record here."""
+        """Inside this context, the forms of `algebra.structured` record here."""
         token = RECORDER.set(self)
         try:
             yield
@@ -150,7 +150,7 @@ class Recorder:
             RECORDER.reset(token)
 
     def program(self, name: str, doc: str = "") -> Program:
-        """Return the program of the notes so far."""
+        """Return the program recorded so far."""
         body, _ = prune(tuple(self._open[0]), ())
         main = Function(self._titles.new(name), doc, tuple(self._inputs), body, ())
         return Program((*(function for function, _, _ in self._functions.values()), main), tuple(self.memories))
@@ -160,7 +160,7 @@ class Recorder:
         if len(values) != len(operation.takes):
             raise TypeError(f"{operation.name} takes {len(operation.takes)} values, not {len(values)}")
         if operation.name == "number_of" and kind_of(values[0]) == NUMBER:
-            # A count that is kept from step to step is a number already.
+            # A count kept from step to step is already a number.
             return values[0]
         refs = list[Value]()
         for value, kind in zip(values, operation.takes, strict=True):
@@ -173,7 +173,7 @@ class Recorder:
             refs.append(float(ref) if kind == NUMBER and type(ref) is not str else ref)
         if operation.name in SHORTENED and (known := shortened(operation.name, values, refs)) is not None:
             return known
-        # Equal constants of two types, or of two signs, are not the same.
+        # Equal constants of different types, or zeros of different signs, are not the same.
         key: Any = (operation.name, *(r if type(r) is str else (type(r), repr(r)) for r in refs))
         return self._once(key, lambda ref: Op(ref, operation, tuple(refs)), operation.gives)
 
@@ -242,7 +242,7 @@ class Recorder:
         pairs = zip(names, self._refs(state), self._refs(after), strict=True)
         slots = tuple(Slot(name, kind, before, then) for (name, kind), before, then in pairs)
         loop = Loop(counter, _ref(most), slots, head, None if done is None else _ref(stop), block)
-        # What writes nothing is recorded once; a state with buffers may be written elsewhere.
+        # A block that writes nothing is recorded once; a state with buffers may be written elsewhere.
         key = self._likeness((loop,), {}) if len(names) == len([*leaves(state)]) else None
         known: list[Any] = [seen[key] for seen in self._seen if key and key in seen]
         if not known:
@@ -252,8 +252,8 @@ class Recorder:
         return known[0]
 
     def _likeness(self, block: tuple[Any, ...], names: dict[Value, int]) -> Any:
-        """Return a key that is equal for blocks that compute the same, whatever names they give to it, which `names` gets;
-        None for one that calls, writes or reads what is written."""
+        """Return a key that is equal for blocks with the same computation, whatever their names, which are added to
+        `names`; None for a block that calls, writes, or reads memory that is written."""
         keys: list[Any] = []
 
         def of(value: Value) -> Any:
@@ -293,7 +293,7 @@ class Recorder:
         return None
 
     def call(self, equation: Callable[..., Any], values: tuple[Any, ...]) -> Any:
-        """Record a call of an equation that is recorded once for each form of its arguments."""
+        """Record a call of an equation, which is itself recorded once for each form of its arguments."""
         flat = [value for leaf in leaves(values) for value in self._parts(leaf)]
         key = (equation, self._form(values))
         if key not in self._functions:
@@ -335,24 +335,24 @@ class Recorder:
 
     @contextmanager
     def _alone(self, mark: str = "") -> Generator[None]:
-        """Record a function apart from what is open."""
+        """Inside this context, record a function separately from the open blocks."""
         outer = self._open, self._seen, self._names
         self._open, self._seen, self._names = [], [], _Names((memory.name for memory in self.memories), mark)
         yield
         self._open, self._seen, self._names = outer
 
     def _parts(self, leaf: Any) -> list[Any]:
-        """Yield the parts of an argument that are passed on: those not known while recording."""
+        """Yield the parts of an argument that are passed in the call: those not known while recording."""
         if isinstance(leaf, Buffer):
             return self._parts(leaf.base) + self._parts(leaf.size)
         return [] if type(leaf) in (int, bool) else [leaf]
 
     def _form(self, value: Any) -> Any:
-        """Return a form that is equal for arguments that one recording serves."""
+        """Return a key that is equal for arguments that can share a recording."""
         if isinstance(value, tuple):
             return (type(value), *(self._form(part) for part in value))  # pyright: ignore
         if isinstance(value, Buffer):
-            # Numbers that are known while recording make the list itself the form.
+            # If all numbers are known while recording, the list itself is the form.
             cells = value.cells.memory.name if isinstance(value.cells, Cells) else id(value.cells)
             return (cells, self._form(value.base), self._form(value.size))
         if value is None or type(value) in (int, bool):

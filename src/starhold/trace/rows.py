@@ -1,5 +1,5 @@
-"""Recordings in which an equation of many rows is computed of several at once: of one lane in short vectors, of many lanes
-operation by operation."""
+"""Recorders that compute an equation of many rows for several rows at once: in short vectors on one lane, operation by
+operation on many lanes."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from starhold.trace.program import Block, Branch, Call, Function, Loop, Op, Prog
 from starhold.trace.recording import Recorder
 
 ROWS = 8
-"""The most rows that are computed at once: the numbers of the widest registers."""
+"""Most rows computed at once: the numbers in the widest register."""
 
 
 class LanesRecorder(Recorder):
-    """A recorder for many lanes: it records `each` of `algebra.several` operation by operation of all rows, which wait less
-    for each other than those of one row, and read the same numbers while these are in registers."""
+    """A recorder for many lanes: it records `each` of `algebra.several` operation by operation across all rows. Operations
+    of different rows do not wait for each other, and read shared numbers while these are in registers."""
 
     def each(self, equation: Callable[..., Any], rows: Sequence[Any], shared: Any) -> tuple[Any, ...]:
-        """Record an equation of every row, side by side where it computes with operations alone."""
+        """Record an equation for every row, side by side if it consists of operations alone."""
         block, out, parts = self._open[-1], list[Any](), list[list[Any]]()
         begin = len(block)
         for row in rows:
@@ -34,7 +34,7 @@ class LanesRecorder(Recorder):
 
 
 def _side_by_side(parts: list[list[Op]]) -> list[Op]:
-    """Return the operations of all parts in turn, each after those that it reads."""
+    """Return the operations of all parts in turn, each after those whose results it reads."""
     waiting = {s.ref for part in parts for s in part}
     left, order = [deque(part) for part in parts], list[Op]()
     while waiting:
@@ -46,13 +46,12 @@ def _side_by_side(parts: list[list[Op]]) -> list[Op]:
 
 
 class RowRecorder(Recorder):
-    """A recorder that records `each` of `algebra.several` as calls of several rows."""
+    """A recorder of `each` of `algebra.several` as calls over several rows."""
 
     by_rows = True
 
     def each(self, equation: Callable[..., Any], rows: Sequence[Any], shared: Any) -> tuple[Any, ...]:
-        """Record an equation of every row: of up to `ROWS` rows at once where it computes the same of all with operations
-        alone."""
+        """Record an equation for every row, up to `ROWS` at once if it consists of the same operations for all."""
         if not self.by_rows:
             return super().each(equation, rows, shared)
         out: list[Any] = []
@@ -63,11 +62,11 @@ class RowRecorder(Recorder):
         return tuple(out)
 
     def _together(self, equation: Callable[..., Any], rows: Sequence[Any]) -> list[Any] | None:
-        """Return what a call of several rows gives each; None where their forms differ, or the equation does more than
-        operations on its arguments."""
+        """Return each row's result of a call over several rows; None where their forms differ, or the equation does more
+        than operations on its arguments."""
         if len({self._form(row) for row in rows}) > 1:
             return None
-        # No other name has a dot: what is not an argument, but from outside, is none of these names.
+        # No other name has a dot, so a value from outside that is no argument has none of these names.
         self.by_rows = False
         function, kept, out = self._define(equation, rows[0], ".")
         self.by_rows = True
@@ -100,7 +99,7 @@ class RowRecorder(Recorder):
 
 
 def unrolled(program: Program) -> Program:
-    """Return the program with the operations of each row on their own, for printers of other languages."""
+    """Return the program with the operations of each row separate, for printers of other languages."""
     known: dict[str, Function] = {}
 
     def of(function: Function) -> Function:
@@ -131,7 +130,7 @@ def unrolled(program: Program) -> Program:
 
 
 def _operations(s: Call, row: int, seen: dict[Any, str]) -> list[Op]:
-    """Return the operations of a row, without those of rows before it that are the same."""
+    """Return the operations of a row that are not among those of earlier rows."""
     function, made = s.function, list[Op]()
     names: dict[Value, Value] = {name: s.args[k * s.rows + row] for k, (name, _) in enumerate(function.params)}
     outs = [out for out in dict.fromkeys(function.outs) if out not in function.params and isinstance(out[0], str)]

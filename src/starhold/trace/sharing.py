@@ -1,8 +1,8 @@
-"""A program of many lanes is split in two, so that what all lanes share is computed once: the shared part runs first and
-leaves a row of numbers for each turn of the loop, which the part of a lane reads.
+"""Splits a program of many lanes in two, so that values common to all lanes are computed once: the shared part runs first
+and stores a row of numbers for each iteration of the loop, which the lane's part reads.
 
-A value differs where it comes from the number of the lane or of the block of lanes, from a lane's own memory, or from
-another that differs. Only numbers are handed over: truths, words and indices are cheap, and computed in both parts.
+A value differs between lanes if it depends on the number of the lane or of its block, on a lane's own memory, or on another
+such value. Only numbers are stored: truths, words and indices are cheap, and are computed in both parts.
 """
 
 from starhold.algebra.operations import NUMBER, OPERATIONS
@@ -24,7 +24,7 @@ from starhold.trace.program import (
 )
 
 ROWS, ENDS = "rows", "ends"
-"""Memories between the parts: the numbers of each turn, row after row, and those after the last turn."""
+"""Memories between the parts: the numbers of each iteration, row after row, and those after the last one."""
 
 
 def differing(program: Program) -> set[Value]:
@@ -32,7 +32,7 @@ def differing(program: Program) -> set[Value]:
     of_lanes = {memory.name for memory in program.memories if memory.lanes}
     blocks, place = _loops(program)
     names, before = {blocks.counter}, -1
-    # What the end of a turn gives is the start of the next.
+    # The values at the end of an iteration are those at the start of the next.
     while before != (before := len(names)):
         for s in statements(program.main.body):
             if isinstance(s, Op):
@@ -44,7 +44,7 @@ def differing(program: Program) -> set[Value]:
             elif isinstance(s, Call):
                 names.update(name for name, _ in s.refs)
             elif isinstance(s, Loop):
-                # One that writes for each lane stays with the lanes as a whole.
+                # A block that writes for each lane stays in the lane's part as a whole.
                 apart = s is not blocks and s is not blocks.body[place] and writes(s.body)
                 for slot in s.slots:
                     if apart or not names.isdisjoint((s.most, s.done, slot.before, slot.after)):
@@ -53,15 +53,15 @@ def differing(program: Program) -> set[Value]:
 
 
 def split(program: Program, most: int) -> tuple[Program, Program]:
-    """Split a loop over blocks of lanes, in each of which the lanes go through a loop of a given count of turns, of at most
-    so many: into the program of what all lanes share, which runs first, and that of a lane."""
+    """Split a loop over blocks of lanes, which contains a loop of a given count of at most `most` iterations. Return the
+    program of the values common to all lanes, which runs first, and that of a lane."""
     names, (blocks, place), main = differing(program), _loops(program), program.main
     loop: Loop = blocks.body[place]
     before, after = blocks.body[:place], blocks.body[place + 1 :]
     around = tuple(s for s in main.body if s is not blocks)
 
     def same(block: Block) -> Block:
-        """Return what a block computes for all lanes; of a loop the slots that all share."""
+        """Return the part of a block that is common to all lanes; a loop keeps the slots that all share."""
         shared = (
             s._replace(slots=tuple(slot for slot in s.slots if slot.name not in names)) if isinstance(s, Loop) else s
             for s in block
@@ -101,13 +101,13 @@ def split(program: Program, most: int) -> tuple[Program, Program]:
 
 
 def _loops(program: Program) -> tuple[Loop, int]:
-    """Return the loop over blocks of lanes, and the place in it of the loop that each lane goes through."""
+    """Return the loop over blocks of lanes, and the index in its body of the loop of each lane."""
     (blocks,) = (s for s in program.main.body if isinstance(s, Loop))
     counts = {name for name, _ in program.main.params}
     return blocks, next(k for k, s in enumerate(blocks.body) if isinstance(s, Loop) and s.most in counts)
 
 
 def _places(loop: Loop, width: int) -> list[Op]:
-    """Return the places of a turn's row; no other name has a dot."""
+    """Return the indices of the numbers in an iteration's row; no other name has a dot."""
     begin = Op("row.", OPERATIONS["index_product"], (loop.counter, width))
     return [begin, *(Op(f"row.{k}", OPERATIONS["index_plus"], ("row.", k)) for k in range(width))]

@@ -1,7 +1,7 @@
-"""A program is printed as text that people read: this is common to C and JavaScript.
+"""Prints a program as text that people read; common to C and JavaScript.
 
-An operation that is read once is written where it is read, unless the text grows long; so is a load from a table, but
-not from memory that may be written to in between. Loops of the trace are loops, and those of one turn are branches.
+An operation whose result is read once is written where it is read, unless the text grows long; so is a load from a table,
+but not from memory that may be written in between. Loops stay loops, and those of one iteration are branches.
 """
 
 import math
@@ -32,11 +32,11 @@ from starhold.trace.program import (
 )
 
 WIDTH = 110
-"""Characters of a line, where one can be broken."""
+"""Longest line in characters, where it can be broken."""
 TIE = "\N{NO-BREAK SPACE}"
-"""This is written as a blank at which no line is broken."""
+"""Printed as a blank at which no line is broken."""
 LONG, SHORT = 72, 28
-"""Characters of an expression that is written where it is read: of one that is read once, and of any made of indices."""
+"""Longest expressions in characters that are written where they are read: those read once, and those of indices."""
 
 _CALL, _UNARY, _OTHER = "()", "unary", "other"
 _LEVELS = {_CALL: 9, _UNARY: 8, "*": 7, "/": 7, "+": 6, "-": 6, "<": 5, "<=": 5, "==": 5, "===": 5,
@@ -45,7 +45,7 @@ _BITS = ("&", "|", "^", ">>")
 
 
 class Expression(NamedTuple):
-    """An expression is a text, and the operator that binds it least."""
+    """The text of an expression, and its operator of lowest precedence."""
 
     text: str
     operator: str = _CALL
@@ -53,7 +53,7 @@ class Expression(NamedTuple):
 
 @cache
 def operator_of(text: str) -> str:
-    """Return the operator of a text with places for its operands."""
+    """Return the operator of a text with placeholders for its operands."""
     if match := re.fullmatch(r"\{0\} (\S+) (?:\{1\}|\d+)", text):
         return match[1] if match[1] in _LEVELS else _OTHER
     if re.fullmatch(r"(-|!|\(\w+\))\{0\}", text):
@@ -65,12 +65,12 @@ def operator_of(text: str) -> str:
 
 @cache
 def _times(text: str, place: int) -> int:
-    """Return how often a text names an operand or parts of it."""
+    """Return how often a text contains an operand or its halves."""
     return len(re.findall(rf"\{{{place}[hl]?\}}", text))
 
 
 def _stands(inner: str, outer: str, place: int) -> bool:
-    """Return whether an operand needs no parentheses; they are written too where only a compiler's warning requires them."""
+    """Return whether an operand needs no parentheses, not even to avoid a compiler's warning."""
     if outer == _CALL:
         return True
     if outer in _BITS:
@@ -90,14 +90,13 @@ def fitted(inner: Expression, outer: str, place: int) -> str:
 
 
 class Source(ABC):
-    """The printer makes the text of a program in a language with braces. Memories keep their order, and counts and words
-    come last."""
+    """Printer for languages with braces. Memories keep their order as arguments, and counts and words come last."""
 
     language: ClassVar[str]
     special: ClassVar[dict[str, str]]
     """Numbers that are not finite, by their names in Python."""
     taken: ClassVar[frozenset[str]]
-    """Names that no function may have, besides words of the language."""
+    """Names that no function may have, besides reserved words of the language."""
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -117,7 +116,7 @@ class Source(ABC):
 
     @property
     def name(self) -> str:
-        """The function that is called has this name."""
+        """The name of the function to call."""
         return self.titles[self.program.main.name]
 
     def __str__(self) -> str:
@@ -148,7 +147,7 @@ class Source(ABC):
 
     @abstractmethod
     def _declared(self, kind: str, changes: bool = False) -> str:
-        """Return the text before the name of a value where it is declared."""
+        """Return the text that precedes a name in its declaration."""
 
     @abstractmethod
     def _call(self, s: Call) -> None:
@@ -164,7 +163,7 @@ class Source(ABC):
         return repr(number) if math.isfinite(number) else self.special[str(number)]
 
     def _parts(self, name: str, kind: str) -> list[str]:
-        """Return the names of a value's parts."""
+        """Return the names of a value's parts: the value, or the halves of a word."""
         return [name]
 
     def _halves(self, kind: str) -> int:
@@ -195,12 +194,12 @@ class Source(ABC):
         self.lines += [part.replace(TIE, " ") for part in wide.wrap(line)]
 
     def open(self, line: str) -> None:
-        """Begin a block in braces."""
+        """Open a block in braces."""
         self.put(line + " {")
         self.depth += 1
 
     def close(self) -> None:
-        """End it."""
+        """Close the block."""
         self.depth -= 1
         self.put("}")
 
@@ -213,20 +212,20 @@ class Source(ABC):
             self.lines[-1] += " */"
 
     def use(self, value: Value, kind: str) -> Expression:
-        """A value is written as the text or the name that stands for it."""
+        """Return the expression or the name that stands for a value."""
         if isinstance(value, str):
             return self._folded.get(value, Expression(value))
         text = self._constant(value, kind)
         return Expression(text, _UNARY if text.startswith("-") else _CALL)
 
     def text(self, value: Value, kind: str) -> str:
-        """A value is written as `use` does where no operator is near."""
+        """Return the text of a value that is no operand of another expression."""
         return self.use(value, kind).text
 
-    # Where names are read.
+    # How often names are read.
 
     def _prepare(self, function: Function) -> None:
-        """Find the values that are read once, in the block that computes them."""
+        """Find the values that are read once, and in the block that computes them."""
         home: dict[str, int] = {}
         seen: dict[Value, list[int]] = defaultdict(list)
         blocks = 0
@@ -260,7 +259,7 @@ class Source(ABC):
         self._folded = {}
 
     def _operands(self, s: Any) -> Iterator[tuple[Value, int]]:
-        """Yield the values that a statement reads where it stands, and how often its text names them."""
+        """Yield the values that a statement itself reads, and how often its text contains each."""
         if isinstance(s, Op):
             texts = self._texts(s)
             for place, value in enumerate(s.args):
@@ -274,11 +273,11 @@ class Source(ABC):
             yield from ((value, 1) for value in reads((s._replace(body=()),) if isinstance(s, Branch) else (s,)))
 
     def _results(self, function: Function) -> Iterator[tuple[Value, int]]:
-        """Yield the values that a function gives, and how often its text names them."""
+        """Yield the values that a function returns, and how often its text contains each."""
         yield from ((out, self._halves(kind)) for out, kind in function.outs)
 
     def _texts(self, s: Op) -> Sequence[str]:
-        """Return the texts of an operation."""
+        """Return the texts of an operation, one for each part of its result."""
         return (s.operation.meanings[self.language],)
 
     # Statements.
@@ -320,7 +319,7 @@ class Source(ABC):
         )
 
     def _keep(self, ref: str, kind: str, expression: Expression, moves: bool = True) -> None:
-        """Name a value, or keep its text for where it is read."""
+        """Name a value, or keep its text to be written where it is read."""
         short = kind == INDEX and len(expression.text) <= SHORT
         if short or (moves and ref in self._once and len(expression.text) <= LONG):
             self._folded[ref] = expression
@@ -334,7 +333,7 @@ class Source(ABC):
         if not one:
             begun, most = f"{self._declared(INDEX, changes=True)} {s.counter} = 0", self.text(s.most, INDEX)
             self.open(f"for ({begun}; {s.counter} < {most}; {s.counter}++)")
-            # The values at the start of a turn stay while the variables change one after another.
+            # The values at the start of an iteration are kept while the variables change one after another.
             for slot in s.slots:
                 ends = zip(self._parts(slot.name, slot.kind), self._parts(slot.end, slot.kind), strict=True)
                 for part, end in ends if slot.name in self._read else ():
@@ -385,7 +384,7 @@ def _reached(function: Function, functions: dict[str, Function]) -> dict[str, Fu
 
 
 def _titles(names: list[str], taken: set[str]) -> dict[str, str]:
-    """Functions are called by their names in the text, numbered where those are taken."""
+    """Return each function's name in the text, numbered where it is taken."""
     titles: dict[str, str] = {}
     for name in names:
         free = (f"{name}_{number}" if number else name for number in range(len(taken) + len(names) + 1))

@@ -1,5 +1,5 @@
-"""Prints an equation as a straight-line program for the proof kernel: inputs by name, steps, places of outputs; and reads
-such programs in floats."""
+"""Prints an equation as a straight-line program for the proof kernel (inputs by name, steps, indices of outputs), and
+evaluates such programs in floats."""
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
@@ -17,7 +17,7 @@ from starhold.trace.recording import Recorder
 
 
 def labelled(name: str, value: Any) -> Iterator[tuple[str, float]]:
-    """Yield the floats of a nested value by the names that a program gives its inputs: craft.inertia.0."""
+    """Yield the floats of a nested value with their names as inputs of a program, such as craft.inertia.0."""
     if isinstance(value, tuple):
         fields = getattr(value, "_fields", range(len(value)))  # pyright: ignore[reportUnknownArgumentType]
         for field, part in zip(fields, value, strict=True):  # pyright: ignore[reportUnknownVariableType,reportUnknownArgumentType]
@@ -36,8 +36,8 @@ class _NumbersAlone(Recorder):
 
 
 def straight_line(equation: Callable[..., Any], **given: Any) -> dict[str, Any]:
-    """Return an equation as a program of the proof kernel; its arguments are shaped like those given, whose floats become
-    the inputs that it reads. InputError where it has loops or buffers, UnreadableError where it has words."""
+    """Return an equation as a program of the proof kernel. The equation is called with the arguments given, whose floats
+    become the program's inputs. Raise InputError if it has loops or buffers, UnreadableError if it has words."""
     recorder = _NumbersAlone()
     x, y = recorder.memory("x"), recorder.memory("y", writable=True)
     names = [label for name, value in given.items() for label, _ in labelled(name, value)]
@@ -60,7 +60,7 @@ def straight_line(equation: Callable[..., Any], **given: Any) -> dict[str, Any]:
     def at(value: Any) -> int:
         if isinstance(value, str):
             return places[value]
-        # Zero has two signs.
+        # Zeros of both signs are distinct.
         text = float(value).hex()
         if text not in constants:
             constants[text] = step("constant", text)
@@ -102,8 +102,8 @@ READERS: dict[str, Callable[..., Any]] = {
 
 
 def evaluated(program: Mapping[str, Any], **given: Any) -> list[Any]:
-    """Return the outputs of a program, in floats, for arguments shaped like those that it was recorded with; their numbers
-    may be columns (n,)."""
+    """Return the outputs of a program in floats, for arguments shaped like those of its recording; their numbers may be
+    columns (n,)."""
 
     def read(name: str) -> Any:
         value, *path = name.split(".")

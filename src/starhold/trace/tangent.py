@@ -1,7 +1,8 @@
-"""The derivative of a program is a program: each number that depends on what is varied gets its slope in one direction.
+"""The derivative of a program is a program: each number that depends on the varied memories gets its slope in one
+direction.
 
-Lanes are directions: all compute the same numbers and each its own slopes, so that a vector of lanes is as many columns
-of a Jacobian, exact but for rounding. Source: A. Griewank, A. Walther, Evaluating Derivatives (2008), forward mode by
+Lanes are directions: all compute the same numbers and each its own slopes, so a vector of lanes gives as many columns of a
+Jacobian, exact but for rounding. Source: A. Griewank, A. Walther, Evaluating Derivatives (2008), forward mode by
 transformation of the source.
 """
 
@@ -14,16 +15,16 @@ from starhold.algebra.operations import NUMBER, OPERATIONS
 from starhold.trace.program import Block, Branch, Call, Function, Load, Loop, Memory, Op, Program, Slot, Store, Value, prune
 
 ROUNDS = 2.0**51
-"""Who adds a constant of this size rounds to whole numbers, and the result has no slope."""
+"""Adding a constant of this size rounds to integers, and the result has zero slope."""
 MARK = ".d"
-"""The slope of a name, or of a memory, has this after it; no other name has a dot there."""
+"""Suffix of the slope of a name or of a memory; no other name contains it."""
 
 
 def tangent(program: Program, varied: Collection[str]) -> Program:
-    """Return a program that computes the slopes of what it stores in the varied memories too. Each of them has a memory
-    beside it, NAME.d, for the slopes of its numbers.
+    """Return a program that also computes the slopes of the numbers in the varied memories. Beside each stands a memory
+    NAME.d for the slopes of its numbers.
 
-    ValueError where a number's bits are read, which have no slope."""
+    Raise ValueError if a number's bits are read, which have no slope."""
     made = _Tangent(varied)
     body = made.block(program.main.body, {})
     main = program.main._replace(body=prune(body, ())[0])
@@ -33,7 +34,7 @@ def tangent(program: Program, varied: Collection[str]) -> Program:
 
 
 class _Tangent:
-    """The transformation of one program. `slopes` are by name those of numbers that have one."""
+    """The transformation of one program. `slopes` maps the names of numbers to the names of their slopes."""
 
     def __init__(self, varied: Collection[str]) -> None:
         self.varied = varied
@@ -42,7 +43,7 @@ class _Tangent:
         self._count = 0
 
     def block(self, block: Block, slopes: dict[Value, Value]) -> Block:
-        """Return the statements of a block with those of slopes between them; `slopes` grows."""
+        """Return the statements of a block with those of the slopes added, and add to `slopes`."""
         result: list[Any] = []
         for s in block:
             if isinstance(s, Loop):
@@ -96,7 +97,7 @@ class _Tangent:
         slopes[s.ref] = new
 
     def _loop(self, s: Loop, slopes: dict[Value, Value]) -> Loop:
-        """Return the loop with slots for the slopes of those that have one before it or after a turn."""
+        """Return the loop with a slot for the slope of each slot that has one before it or after an iteration."""
         moving = {slot.name for slot in s.slots if slot.before in slopes}
         while True:
             inner = slopes | {name: name + MARK for name in moving}
@@ -144,7 +145,7 @@ def _rounds(x: Value) -> bool:
 
 
 def _joined(put: Any, operation: str, one: Value | None, other: Value | None) -> Value:
-    """Return the sum or difference of two slopes of which at most one is nothing."""
+    """Return the sum or difference of two slopes, of which at most one is None."""
     if other is None:
         return one
     if one is None:

@@ -1,1 +1,1 @@
-"""The checks of laws for each body, in the module of the body's name; `any_body` holds those for all others."""
+"""The checks of laws for each body, in the module of the body's name; `any_body` has those for all others."""

@@ -1,4 +1,4 @@
-"""These checks are for laws of a body that is known only by what its part declares."""
+"""The checks for laws of a body that is known only by the declarations of its part."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -25,7 +25,7 @@ def _loop(law: Law, gains: Any) -> ClosedLoop:
 
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:
-    """A loop with a part, under a law that is installed for its body."""
+    """Return a loop with a part, and a law installed for its body."""
     law = next(iter(catalogue(part.body).values()), None)
     if law is None:
         raise NotApplicableError(f"no law for the body {part.body} is installed")
@@ -33,7 +33,7 @@ def loop_with(part: Part, params: Any) -> ClosedLoop:
 
 
 def _measurements(loop: ClosedLoop, count: int) -> Iterator[Any]:
-    """The measurements of the start, of zeros, and of random states of all sizes that the body counts as sound."""
+    """Return the measurements at the start, of zeros, and of random states of all sizes that the body counts as sound."""
     random = np.random.default_rng(1)
     body, step, carry, setup = loop.body.module, make_step(loop.composition()), loop.carry(), loop.setup()
     size = len(flatten(loop.start))
@@ -59,7 +59,7 @@ def is_pure(law: Law) -> None:
 
 
 def stays_finite(law: Law) -> None:
-    """Finite command at sound states, near and far."""
+    """The command is finite at sound states, near and far."""
     for gains in law.examples():
         loop = _loop(law, gains)
         for measurement in _measurements(loop, 200):
@@ -79,7 +79,7 @@ def survives_toml(law: Law) -> None:
 
 
 def flies_a_scenario(law: Law) -> None:
-    """It flies from a scenario file and is measured; the motion is not lost."""
+    """It flies from a scenario file and is measured; the motion does not diverge."""
     for gains in law.examples():
         loop = _loop(law, gains)
         lost = measure(label(loop, *fly(loop, STEPS), 1))["diverged_at"]

@@ -1,4 +1,4 @@
-"""The checks for laws that hold a place near a libration point."""
+"""The checks for laws of station keeping near a libration point."""
 
 from dataclasses import replace
 from typing import Any
@@ -29,7 +29,7 @@ def _loop(law: Law, gains: Any) -> ClosedLoop:
 
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:
-    """A loop that holds a part, and a field where it gives none."""
+    """Return a loop with a part, and with a gravity field if the part is none."""
     law = catalogue("libration-point")["l2-circle"]
     field = () if part.hook("acceleration") else PARTS[:1]
     return replace(_loop(law, law.examples()[0]), parts=(*field, Fitted(part, params)))

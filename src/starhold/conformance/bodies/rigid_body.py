@@ -1,4 +1,4 @@
-"""The checks for laws that turn a rigid body."""
+"""The checks for attitude laws of a rigid body."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -34,12 +34,12 @@ from starhold.scenario.writing import scenario_with
 from starhold.simulation.lane import fly, label
 
 FEW = 16
-"""Flights that try a certificate."""
+"""Number of flights that test a certificate."""
 ON_TARGET = Measurement((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.1)
 
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:
-    """A loop with a part and the parts that it needs."""
+    """Return a loop with a part and the parts that it needs."""
     law = catalogue()["lyapunov"]
     loop = sample_loop(law, law.examples()[0])
     if part.role == "target":
@@ -66,23 +66,23 @@ def reads_alike(law: Law) -> None:
     """Plain Python, one lane and every lane of a batch agree bit for bit."""
     for gains in law.examples():
         loop = sample_loop(law, gains)
-        # The other lanes that start alike draw other random numbers of their sensors.
+        # The other lanes with the same start draw other random numbers for their sensors.
         lanes = (0,) if _senses(law) else (0, 2)
         agree(loop, [replace_rate(loop.start, factor) for factor in (1.0, 0.5, 1.0, 2.0)], lanes)
 
 
 def _senses(law: Law) -> bool:
-    """Whether the law needs the reading of a sensor."""
+    """Return whether the law needs the reading of a sensor."""
     return not {*law.reads} <= {*GIVEN}
 
 
 def replace_rate(state: Any, factor: float) -> Any:
-    """The state with its rate multiplied."""
+    """Return the state with its rate multiplied by a factor."""
     return state._replace(rate=tuple(factor * w for w in state.rate))
 
 
 def rests_on_target(law: Law) -> None:
-    """No torque at rest on target."""
+    """The torque is zero at rest on target."""
     for gains in law.examples():
         torque = call(law, ON_TARGET, gains)
         size = float(np.abs(torque).max())
@@ -90,7 +90,7 @@ def rests_on_target(law: Law) -> None:
 
 
 def treats_quaternion_sign_as_stated(law: Law) -> None:
-    """q and -q give what the card says of the double cover."""
+    """The torques at q and -q agree or differ as the card states."""
     for gains in law.examples():
         differences: list[float] = []
         for measurement in random_measurements(20):
@@ -122,7 +122,7 @@ def ignores_inertial_frame(law: Law) -> None:
 
 
 def stays_finite(law: Law) -> None:
-    """Finite torque at half turns, at zero error and at rest."""
+    """The torque is finite at half turns, at zero error and at rest."""
     halves = [(0.0, *axis) for axis in ((1.0, 0.0, 0.0), (0.0, 0.6, -0.8), (1 / math.sqrt(3.0),) * 3)]
     for gains in law.examples():
         for attitude in [(1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0), *halves]:
@@ -148,20 +148,20 @@ def keeps_units(law: Law) -> None:
 
 
 def _near(seen: Measurement, share: float) -> Measurement:
-    """A motion near the target: this share of another's error and rates."""
+    """Return a measurement near the target: this share of another's error and rates."""
     _, *error = seen.attitude
     x, y, z, *rates = [share * number for number in (*error, *seen.rate, *seen.body_rate)]
     return seen._replace(attitude=normalise((1.0, x, y, z)), rate=tuple(rates[:3]), body_rate=tuple(rates[3:]))
 
 
 MOTIONS = (*random_measurements(5), *map(_near, random_measurements(3), (0.1, 1e-2, 1e-3)))
-"""Far from the target, and in boundary layers about it."""
+"""Measurements far from the target, and in boundary layers about it."""
 HOLDS = (1, 4, 16, 64, 256)
-"""Calls in which each motion is shown, round after round, as long as a gain has changed nothing."""
+"""Calls with each measurement in successive rounds, as long as a gain has changed nothing."""
 
 
 def _torques(law: Law, gains: Any, system: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Iterator[NDArray[np.float64]]:
-    """The torques (3,), in N m, of one call after the other in a system of units; the law remembers what it was shown."""
+    """Yield the torques (3,), in N m, of successive calls in a system of units; the law's memory carries over."""
     memory: Any = None
     for hold in HOLDS:
         for motion in MOTIONS:
@@ -173,14 +173,14 @@ def _torques(law: Law, gains: Any, system: tuple[float, float, float] = (1.0, 1.
 
 
 def _changed(law: Law, gains: Any) -> Iterator[Any]:
-    """Yield gains with one number at a time, of those with a unit, greater by half."""
+    """Yield gains with one number that has a unit increased by half, one at a time."""
     for place, (item, value) in enumerate(zip(law.fields(), gains, strict=True)):
         if not (item.gain.choices or item.gain.whole):
             yield law.gains(*gains[:place], times(value, 1.5), *gains[place + 1 :])
 
 
 def _first_effect(torques: Iterator[NDArray[np.float64]], others: Iterator[NDArray[np.float64]]) -> int:
-    """Count the calls until torques differ by as much as a wrong unit would make them; 0 where they never do."""
+    """Return the number of calls until torques differ by as much as with a wrong unit; 0 if they never do."""
     size = 1e-9
     for number, (one, other) in enumerate(zip(torques, others, strict=True), 1):
         size = max(size, float(np.abs(one).max()))
@@ -190,7 +190,7 @@ def _first_effect(torques: Iterator[NDArray[np.float64]], others: Iterator[NDArr
 
 
 def decreases_lyapunov(law: Law) -> None:
-    """V is positive and does not rise, at random states, for a body free of other torques."""
+    """V is positive and non-increasing, at random states, for a body free of other torques."""
     if law.lyapunov is None:
         raise NotApplicableError("the law has no `lyapunov`")
     if law.card.claims == "none":
@@ -216,7 +216,7 @@ def can_be_certified(law: Law) -> None:
 
 
 def flies_a_scenario(law: Law) -> None:
-    """It flies from a scenario file, is measured, timed and certified, and flights do not contradict what is proved."""
+    """It flies from a scenario file, is measured, timed and certified, and flights do not contradict proved claims."""
     for gains in law.examples():
         scenario = parse(scenario_with(law, gains), law.name)
         loop = build(scenario, scenario.laws[0])
@@ -233,7 +233,7 @@ def flies_a_scenario(law: Law) -> None:
 
 
 def _slope(law: Law, measurement: Measurement, gains: Any) -> float:
-    """dV/dt along the closed loop, by a central difference."""
+    """Return dV/dt along the closed loop, by a central difference."""
     state = State(measurement.attitude, measurement.rate, ZERO, ZERO, call(law, measurement, gains))
     loop = ClosedLoop(CRAFT, law, gains, state, measurement.period)
     turning, rates, *_ = make_step(loop.composition()).slope(loop.carry(), CRAFT, loop.setup())[0]

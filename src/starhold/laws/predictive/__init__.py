@@ -1,1 +1,1 @@
-"""The optimiser of the predictive law consists of the problem, its limits, motion over the horizon, and the solver."""
+"""The optimiser of the predictive law: the problem, its limits, the motion over the horizon, and the solver."""

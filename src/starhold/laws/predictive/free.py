@@ -1,4 +1,4 @@
-"""The moves of a predictive program that do without limits, to the first order in the rate: what proofs are about."""
+"""The moves of a predictive program without active limits, to first order in the rate, for proofs."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from starhold.parts.craft import Craft
 
 Array = NDArray[np.float64]
 STEP = 1e-5
-"""The turn (rad) within the horizon by which slopes are taken."""
+"""The rotation (rad) within the horizon over which slopes are taken."""
 NOTHING = 1e-9
-"""The share of the largest factor below which one counts as zero."""
+"""The share of the largest factor below which a factor counts as zero."""
 
 
 class Plan(NamedTuple):
-    """A plan of moves as the proof kernel takes it: their number; the weights of the state (w, q) (6,) and of the command
-    (3,), and P of the last state (6, 6); the limit (N m) about each axis or, if `ball`, of the norm; by which share of the
-    least cost a plan may cost more; and the moves (moves, 4, 3, 6) that do without the limit, as factors of (w, q):
-    themselves, and their slopes by each component of w. The least cost of a state x is x.cost x, where w = 0."""
+    """A plan of moves for the proof kernel: their number; the weights of the state (w, q) (6,) and of the command (3,), and
+    P of the last state (6, 6); the limit (N m) on each axis or, if `ball`, on the norm; the share of the least cost by
+    which a plan may exceed it; and the unlimited moves (moves, 4, 3, 6), as factors of (w, q) and their slopes with respect
+    to each component of w. The least cost of a state x is x.cost x, where w = 0."""
 
     moves: int
     state: Sequence[float]
@@ -39,8 +39,8 @@ class Plan(NamedTuple):
 
 
 def free_moves(state: Any, command: Any, end: Any, inertia: Array, period: float, count: int) -> tuple[Array, Array]:
-    """Return the moves (count, 4, 3, 6) and the cost (6, 6) of a plan with these weights, for the motion linearised about a
-    rate, without gravity."""
+    """Return the unlimited moves (count, 4, 3, 6) and the cost (6, 6) of a plan with these weights, for the motion
+    linearised about a rate, without gravity."""
 
     def at(rate: Array) -> tuple[Array, Array]:
         A, B = motion(inertia, rate, period)
@@ -61,12 +61,12 @@ def free_moves(state: Any, command: Any, end: Any, inertia: Array, period: float
     slopes = [(at(small * axis)[0] - at(-small * axis)[0]) / (2.0 * small) for axis in np.eye(3)]
     still, cost = at(np.zeros(3))
     moves = np.stack([still, *slopes], axis=1)
-    # What rounding leaves of zeros.
+    # Zeros up to rounding.
     return np.where(np.abs(moves) > NOTHING * np.abs(moves).max(axis=(0, 2), keepdims=True), moves, 0.0), cost
 
 
 def motion(inertia: Array, rate: Array, period: float) -> tuple[Array, Array]:
-    """Return A (6, 6) and B (6, 3) of (w, q), small about a motion at a rate (rad/s), sampled with a held torque."""
+    """Return A (6, 6) and B (6, 3) of small (w, q) about a constant rate (rad/s), sampled with a held torque."""
     inverse, turn = np.linalg.inv(inertia), np.array(skew(tuple(rate)))  # pyright: ignore
     spun = np.array(skew(tuple(inertia @ rate))) - turn @ inertia  # pyright: ignore
     rates = np.zeros((9, 9))
@@ -76,7 +76,7 @@ def motion(inertia: Array, rate: Array, period: float) -> tuple[Array, Array]:
 
 
 def first_move(measurement: Measurement, move: Array, craft: Craft) -> Vector:
-    """Return the torque (N m) of a move (4, 3, 6) without limits, and that which follows the target."""
+    """Return the torque (N m) of an unlimited move (4, 3, 6), and the torque that tracks the target."""
     w = measurement.rate
     x = (*w, *vector_part(measurement.attitude))
 

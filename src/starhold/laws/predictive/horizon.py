@@ -1,5 +1,5 @@
 """Passes over the horizon of a predictive program, each in time proportional to its length: states under a plan, the
-gradient, the Newton step by a backward Riccati sweep, and flights of a step through the limits."""
+gradient, the Newton step by a backward Riccati sweep, and simulations of a step with the limits."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def transition(a: Rows, b: Rows, x: Numbers, v: Vector) -> Numbers:
 
 @function
 def rollout(problem: Problem) -> Scalar:
-    """Find the states under the plan, and half its cost."""
+    """Compute the states under the plan; return half its cost."""
     store, (a, b), weight = carve(problem), motion(problem), weights(problem)
 
     def stage(k: Index, cost: Scalar, x: Numbers) -> tuple[Scalar, Numbers]:
@@ -51,7 +51,8 @@ def rollout(problem: Problem) -> Scalar:
 
 @function
 def adjoint(problem: Problem) -> Scalar:
-    """Find the gradient of half the cost, and a bound on its gap to the optimum if the held limits are active."""
+    """Compute the gradient of half the cost; return a bound on its gap to the optimum, valid if the limits that hold moves
+    are the active ones."""
     store, (a, b), weight, bounds = carve(problem), motion(problem), weights(problem), limits(problem)
     n, columns, pushes = problem.horizon, transposed(a), transposed(b)
 
@@ -72,7 +73,7 @@ def _weighed(r: Any, v: Vector) -> Vector:
 
 
 def _costate(q: Any, columns: Rows, x: Numbers, y: Numbers) -> Numbers:
-    """Return Q x + A'y, summed up together."""
+    """Return Q x + A'y, added term by term."""
 
     def component(i: int) -> Scalar:
         total = 0.0
@@ -87,8 +88,8 @@ def _costate(q: Any, columns: Rows, x: Numbers, y: Numbers) -> Numbers:
 
 
 class Value(NamedTuple):
-    """Half the optimal cost-to-go of a state is x'curvature x / 2 + slope'x + constant. The Newton decrement and the number
-    of active limits are those of the moves so far."""
+    """Half the optimal cost-to-go of a state x is x'curvature x / 2 + slope'x + constant. The Newton decrement and the
+    number of active limits are sums over the moves so far."""
 
     curvature: Rows
     slope: Numbers
@@ -98,11 +99,11 @@ class Value(NamedTuple):
 
 @function
 def sweep(problem: Problem, barrier: Scalar) -> tuple[Scalar, Scalar]:
-    """Find the Newton step by one backward Riccati sweep, as a policy: step + feedback (x - x of the plan). Moves that
-    press against a limit are held there; with a gradient of zeros none are, which gives the policy without limits.
-    Gives the Newton decrement and the number of limits held.
+    """Compute the Newton step by one backward Riccati sweep, as a policy: step + feedback (x - x of the plan). Moves that
+    press against a limit are fixed there; with a zero gradient none are, which gives the policy without limits. Return the
+    Newton decrement and the number of active limits.
 
-    A barrier above zero asks for the step of the interior-point method instead: nothing is held, and the limits repel."""
+    A barrier above zero gives the step of the interior-point method instead: no move is fixed, and the limits repel."""
     store, (a, b), weight, bounds = carve(problem), motion(problem), weights(problem), limits(problem)
     n, columns, pushes = problem.horizon, transposed(a), transposed(b)
     holds = less_equal(barrier, 0.0)
@@ -140,7 +141,7 @@ def sweep(problem: Problem, barrier: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def _held_inverse(bounds: Limits, v: Vector, g: Vector, m: Symmetric, holds: Truth) -> tuple[Symmetric, Scalar]:
-    """Return the inverse of m on the directions that no limit holds, and the number of limits that hold."""
+    """Return the inverse of m on the free directions, and the number of active limits."""
     if bounds.ball:
         normal, multiplier = pressure(bounds, v, g)
         pressed = both(holds, less(0.0, multiplier))
@@ -171,7 +172,7 @@ def _minus(w: Symmetric, x: Vector) -> Vector:
 
 
 def _symmetric(m: Rows) -> Rows:
-    """Keep the matrix symmetric against rounding, which long horizons would amplify."""
+    """Return the matrix made symmetric: long horizons would amplify the rounding."""
 
     def at(i: int, j: int) -> Scalar:
         return m[i][i] if i == j else 0.5 * (m[max(i, j)][min(i, j)] + m[min(i, j)][max(i, j)])
@@ -190,7 +191,7 @@ def policy(store: Store, k: Index, x: Numbers, start: Vector) -> Vector:
 
 @function
 def unroll(problem: Problem) -> None:
-    """Turn the policy into a direction: step becomes the Newton step without limits."""
+    """Turn the policy into a direction: `step` becomes the Newton step without limits."""
     store, (a, b) = carve(problem), motion(problem)
 
     def stage(k: Index, x: Numbers) -> tuple[Numbers]:
@@ -202,8 +203,8 @@ def unroll(problem: Problem) -> None:
 
 
 class Trial(NamedTuple):
-    """A trial plan, with a flag for whether a limit cut a move, and the change of half the cost towards it, slope +
-    curvature / 2, which is free of the cancellation that a difference of two costs suffers."""
+    """A trial plan: whether a limit cut a move, and the change of half the cost, slope + curvature / 2, which avoids the
+    cancellation in a difference of two costs."""
 
     cut: Truth
     slope: Scalar
@@ -211,8 +212,8 @@ class Trial(NamedTuple):
 
 
 def fly(problem: Problem, move: Callable[[Index, Numbers, Vector], Vector], start: Numbers) -> Trial:
-    """Fly moves through the limits: the trial plan, and the change of the states from `start` on. move(k, x, v): where
-    the k-th move, v in the plan, would go for a change x of the state before it."""
+    """Simulate moves with the limits: compute the trial plan, and the change of the states from `start` on. move(k, x, v)
+    is the k-th move, v in the plan, desired for a change x of the state before it."""
     store, (a, b), weight, bounds = carve(problem), motion(problem), weights(problem), limits(problem)
 
     def stage(k: Index, trial: Trial, x: Numbers) -> tuple[Trial, Numbers]:
@@ -232,14 +233,14 @@ def fly(problem: Problem, move: Callable[[Index, Numbers, Vector], Vector], star
 
 @function
 def follow(problem: Problem, start: Numbers) -> Trial:
-    """Fly the policy of a sweep through the limits."""
+    """Simulate the policy of a sweep with the limits."""
     store = carve(problem)
     return fly(problem, lambda k, x, v: policy(store, k, x, add(v, triple(store.step, k))), start)
 
 
 @function
 def take_over(problem: Problem) -> None:
-    """Put the trial plan in the place of the plan."""
+    """Replace the plan by the trial plan."""
     store = carve(problem)
 
     def stage(k: Index) -> None:

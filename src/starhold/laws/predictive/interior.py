@@ -1,4 +1,4 @@
-"""The interior-point method of the predictive law serves programs on which the projected Newton method is slow."""
+"""The interior-point method of the predictive law, for programs on which the projected Newton method is slow."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from starhold.laws.predictive.sixes import triple
 
 MOST_SWEEPS = 30
 INWARD = 0.9
-"""The share of its distance from the centre at which a move starts."""
+"""A move starts at this share of its distance from the centre."""
 SHORT_OF = 0.95
-"""Share of the way to the nearest limit that a step goes."""
+"""A step covers this share of the way to the nearest limit."""
 
 
 class Turn(NamedTuple):
-    """The state of the method is the barrier's height, the sweeps so far, and whether the end is reached."""
+    """The state of the method: the barrier parameter, the sweeps so far, and whether it has ended."""
 
     barrier: Scalar
     sweeps: Scalar
@@ -30,9 +30,9 @@ class Turn(NamedTuple):
 
 @function
 def interior(problem: Problem, half: Scalar, most: Scalar) -> tuple[Scalar, Scalar]:
-    """Solve by the primal-dual interior-point method (Boyd and Vandenberghe 2004, section 11.7): it comes near the
-    optimum in a number of sweeps that hardly depends on the program, and then puts moves near a limit on it. The better
-    of its plan and the given one, of this half cost, is kept. Gives the sweeps, at most `most`, and half the cost."""
+    """Solve by the primal-dual interior-point method (Boyd and Vandenberghe 2004, section 11.7): it approaches the optimum
+    in a number of sweeps that hardly depends on the program, and then moves that are near a limit are put on it. The better
+    of its plan and the given one, of this half cost, is kept. Return the sweeps, at most `most`, and half the cost."""
     count = number_of(_pairs(problem) * problem.horizon)
     barrier = 0.1 * half / count
     _begin(problem, barrier)
@@ -74,7 +74,7 @@ def _begin(problem: Problem, barrier: Scalar) -> None:
 
 
 def _turn(problem: Problem, now: Turn, count: Scalar, most: Scalar) -> Turn:
-    """Take one step towards the optimum that the barrier allows, then lower the barrier."""
+    """Take one step towards the optimum for this barrier, then lower the barrier."""
     adjoint(problem)
     sweep(problem, now.barrier)
     unroll(problem)
@@ -88,7 +88,7 @@ def _turn(problem: Problem, now: Turn, count: Scalar, most: Scalar) -> Turn:
 
 
 def _length(problem: Problem, barrier: Scalar) -> Scalar:
-    """Return the share of the step that keeps slacks and multipliers positive; steps of the multipliers go to `trial`."""
+    """Return the share of the step that keeps slacks and multipliers positive; put the multipliers' steps into `trial`."""
     store, bounds = carve(problem), limits(problem)
 
     def stage(k: Index, length: Scalar) -> tuple[Scalar]:
@@ -112,13 +112,13 @@ def _length(problem: Problem, barrier: Scalar) -> Scalar:
 
 
 def _joined(problem: Problem, x: Vector) -> Vector:
-    """Return for a ball the sum, thrice."""
+    """Return the components of x; for a ball, three times their sum."""
     total = x[0] + x[1] + x[2]
     return (total, total, total) if problem.ball else x
 
 
 def _go(problem: Problem, length: Scalar) -> Scalar:
-    """Take the step at that length; gives the sum of slack times multiplier."""
+    """Take that share of the step; return the sum of slack times multiplier."""
     store, bounds = carve(problem), limits(problem)
 
     def stage(k: Index, gap: Scalar) -> tuple[Scalar]:
@@ -136,7 +136,7 @@ def _go(problem: Problem, length: Scalar) -> Scalar:
 
 
 def _settle(problem: Problem) -> None:
-    """Put moves near a limit on it."""
+    """Put moves that are near a limit on it."""
     store, bounds = carve(problem), limits(problem)
     near = 1e-5 * bounds.bound * bounds.bound
 

@@ -31,7 +31,7 @@ Truths: TypeAlias = tuple[Truth, Truth, Truth]
 
 
 class Limits(NamedTuple):
-    """A move v keeps |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, which is low <= v <= high."""
+    """Limits of a move v: |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, low <= v <= high."""
 
     centre: Vector
     bound: Scalar
@@ -41,7 +41,7 @@ class Limits(NamedTuple):
 
 
 def make_limits(centre: Vector, bound: Scalar, *, ball: bool) -> Limits:
-    """Return limits of that size round that centre."""
+    """Return the limits of size `bound` (N m) about a centre."""
     wide = (bound, bound, bound)
     return Limits(centre, bound, subtract(centre, wide), add(centre, wide), ball)
 
@@ -80,7 +80,7 @@ def pressing(limits: Limits, v: Vector, g: Vector) -> Truths:
 
 
 def pressure(limits: Limits, v: Vector, g: Vector) -> tuple[Vector, Scalar]:
-    """Return for a ball the outward normal (zero inside) and the multiplier of (|v - centre|2 - bound2)/2, zero when not
+    """Return for a ball the outward normal (zero inside) and the multiplier of (|v - centre|^2 - bound^2)/2, zero when not
     pressing."""
     d = subtract(v, limits.centre)
     square = dot(d, d)
@@ -92,7 +92,7 @@ def pressure(limits: Limits, v: Vector, g: Vector) -> tuple[Vector, Scalar]:
 
 
 def loose(limits: Limits, v: Vector, g: Vector) -> Vector:
-    """Return the part of the gradient that no limit holds."""
+    """Return the part of the gradient along free directions."""
     if limits.ball:
         normal, multiplier = pressure(limits, v, g)
         along = add(g, scale(multiplier * limits.bound, normal))
@@ -102,7 +102,7 @@ def loose(limits: Limits, v: Vector, g: Vector) -> Vector:
 
 
 def slack(limits: Limits, v: Vector) -> Vector:
-    """Return (bound2 - d2)/2 for d = v - centre: on each axis of a box, or thrice that of a ball; positive inside."""
+    """Return (bound^2 - d^2)/2 for d = v - centre on each axis of a box, or three times that of a ball; positive inside."""
     d, bound = subtract(v, limits.centre), limits.bound
 
     def room(away: Scalar) -> Scalar:
@@ -116,7 +116,7 @@ def slack(limits: Limits, v: Vector) -> Vector:
 
 
 def repelled(limits: Limits, v: Vector, multipliers: Vector, barrier: Scalar, m: Symmetric) -> tuple[Symmetric, Vector]:
-    """Return a symmetric matrix with the curvature of the limits added, and their push: the interior-point step."""
+    """Return a symmetric matrix plus the curvature of the barrier, and the barrier's gradient: the interior-point step."""
     d, s = subtract(v, limits.centre), slack(limits, v)
     push = times((divide(barrier, s[0]), divide(barrier, s[1]), divide(barrier, s[2])), d)
     y0, y1, y2 = multipliers
@@ -169,13 +169,13 @@ def box_inverse(m: Symmetric, fixed: Truths) -> Symmetric:
 
 
 def plane_inverse(m: Symmetric, n: Vector, multiplier: Scalar) -> Symmetric:
-    """Return the inverse of a symmetric matrix plus multiplier on the plane normal to n, zero along n."""
+    """Return the inverse, on the plane normal to n, of a symmetric matrix plus `multiplier` times E; zero along n."""
     t = _tangent(n)
     u = cross(n, t)
     mt, mu = apply(m, t), apply(m, u)
     tt, tu, uu = dot(t, mt) + multiplier, dot(u, mt), dot(u, mu) + multiplier
     s = divide(1.0, tt * uu - tu * tu)
-    # Columns of the inverse in the tangent basis, carried back to the axes.
+    # Columns of the inverse in the tangent basis, transformed back to the axes.
     y = scale(s, subtract(scale(uu, t), scale(tu, u)))
     z = scale(s, subtract(scale(tt, u), scale(tu, t)))
     return (

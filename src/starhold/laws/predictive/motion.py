@@ -1,4 +1,4 @@
-"""The predictive law plans with a motion that is linearised about the measurement, and sampled with a held torque."""
+"""The motion with which the predictive law plans: linearised about the measurement, and sampled with a held torque."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from starhold.laws.predictive.sixes import Numbers, Rows, transposed
 from starhold.parts.craft import Craft, total_inertia
 
 TERMS = 30
-"""The most terms of the Taylor series; fewer once they no longer matter."""
+"""Most terms of the Taylor series; it ends earlier once terms are negligible."""
 NEGLIGIBLE = 1e-21
 """The size of a term's entries below which the series ends."""
 DOUBLINGS = 60
-"""The most halvings of the time, and doublings afterwards."""
+"""Most halvings of the time, and doublings afterwards."""
 
 
 class Linear(NamedTuple):
-    """The motion is x' = A x + B u for x = (q; w), small about the measured motion, in blocks of three: A = [[turning, E/2],
+    """The motion x' = A x + B u for small x = (q; w) about the measured motion, in blocks of three: A = [[turning, E/2],
     [stiffness, damping]], B = [0; push]."""
 
     turning: Matrix
@@ -47,10 +47,10 @@ class Linear(NamedTuple):
 
 
 def linearise(measurement: Measurement, craft: Craft) -> Linear:
-    """Return the motion near the measurement (SI units).
+    """Return the motion linearised about the measurement (SI units).
 
-    A = [[-[w]x, E/2], [J^-1 G, J^-1 ([Jw]x - [w]x J)]], B = [0; J^-1], G = 6 (mu/R^5) ([R]x J - [JR]x) [R]x with R from
-    the centre of attraction in body axes; G = 0 where there is none (R = 0)."""
+    A = [[-[w]x, E/2], [J^-1 G, J^-1 ([Jw]x - [w]x J)]], B = [0; J^-1], G = 6 (mu/R^5) ([R]x J - [JR]x) [R]x with R the
+    position relative to the centre of attraction in body axes; G = 0 if there is none (R = 0)."""
     w, position = measurement.rate, measurement.position
     momentum, pull = apply(craft.inertia, w), apply(total_inertia(craft), position)
     square = dot(position, position)
@@ -80,7 +80,7 @@ def _by_columns(column: Callable[[Vector], Vector]) -> Matrix:
 
 
 class Rates(NamedTuple):
-    """The blocks are those of A of `Linear` over some time: [[turning, half E], [stiffness, damping]]."""
+    """The blocks of A of `Linear` times some time: [[turning, half E], [stiffness, damping]]."""
 
     turning: Matrix
     half: Scalar
@@ -92,7 +92,7 @@ def sample(problem: Problem, linear: Linear, period: Scalar) -> None:
     """Sample exactly with a held input: A = exp(A h), B = (integral of exp(A s) over 0..h) B of the problem.
 
     Both come from S = sum of (A h)^k / (k + 1)!, which loses no digits where A is singular."""
-    # Time counted in periods: then all entries of A and S are of comparable size.
+    # Time is counted in periods, so that all entries of A and S have comparable size.
     square = period * period
     rates = Rates(_scaled(linear.turning, period), 0.5, _scaled(linear.stiffness, square), _scaled(linear.damping, period))
     share, doublings = _share(rates)
@@ -112,11 +112,11 @@ def sample(problem: Problem, linear: Linear, period: Scalar) -> None:
 
 
 def _put_motion(store: Store, rates: Rates, push: Matrix, period: Scalar) -> None:
-    """Set A and B from S, back in the units of time."""
+    """Set A and B from S, converted back to seconds."""
     columns = [store.mean.row(j, 6) for j in range(6)]
     a = transposed(tuple(_product(rates, column) for column in columns))
     a = tuple(tuple(1.0 + x if i == j else x for j, x in enumerate(row)) for i, row in enumerate(a))
-    # The input moves the rates alone, which are the last three.
+    # The input acts only on the rates, which are the last three.
     b = [tuple(sixes.dot(row[3:], column) for column in transpose(push)) for row in transposed(tuple(columns))]
     per = divide(1.0, period)
     upper = [(*row[:3], *_times(row[3:], period)) for row in a[:3]]
@@ -134,14 +134,14 @@ def _times(row: Numbers, c: Scalar) -> Numbers:
 
 
 def _during(rates: Rates, share: Scalar) -> Rates:
-    """The rates act over that share of the time."""
+    """Return the rates times that share of the time."""
     return Rates(
         _scaled(rates.turning, share), rates.half * share, _scaled(rates.stiffness, share), _scaled(rates.damping, share)
     )
 
 
 def _share(rates: Rates) -> tuple[Scalar, Scalar]:
-    """Return the share of the period, halved until no row's absolute sum passes 1, and how often that was."""
+    """Return the share of the period, halved until no row's absolute sum exceeds 1, and the number of halvings."""
     size = 0.0
     for row in _rows(rates):
         total = 0.0
@@ -171,7 +171,7 @@ def _rows(rates: Rates) -> Rows:
 
 
 def _product(rates: Rates, x: Numbers) -> Numbers:
-    """Return the matrix times a column, without its zeros."""
+    """Return the matrix times a column, without multiplying its zero blocks."""
     t, h = rates.turning, rates.half
     return (
         sixes.dot((t[0][1], t[0][2], h), (x[1], x[2], x[3])),
@@ -182,7 +182,7 @@ def _product(rates: Rates, x: Numbers) -> Numbers:
 
 
 def _sum_up(rates: Rates, mean: Buffer, term: Buffer) -> None:
-    """Write the sum of A^k / (k + 1)! from k = 0 on to `mean`, column after column."""
+    """Write the sum of A^k / (k + 1)! from k = 0 on into `mean`, column by column."""
     for j, column in enumerate(transposed(_rows(rates))):
         first = _times(column, 0.5)
         term.put(j, first)

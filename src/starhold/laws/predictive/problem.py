@@ -3,8 +3,8 @@
     minimise   sum over k < N of x_k'Q x_k + v_k'R v_k,  plus x_N'P x_N,   x_{k+1} = A x_k + B v_k,
     subject to |v_k - centre| <= bound, on each axis (box) or in norm (ball).
 
-`carve` makes the named parts of the buffer: one buffer, not twenty, is what a trajectory carries and what the passes
-over the horizon hand to each other.
+`carve` gives names to the parts of the buffer: a trajectory carries one buffer, not twenty, which all passes over the
+horizon share.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ COUNTERS = 5
 
 
 class Problem(NamedTuple):
-    """A program has `horizon` moves, its numbers, limits in norm (ball) or on each axis, and Q and R full (dense) or
+    """A quadratic program: `horizon` moves, its numbers, limits in norm (ball) or on each axis, and Q and R full (dense) or
     diagonal."""
 
     numbers: Buffer
@@ -33,15 +33,15 @@ class Problem(NamedTuple):
 
 
 class Store(NamedTuple):
-    """A program's numbers fall into these parts. Counters, weights, tail, plan and states are kept from call to call; the
-    rest is written before it is read. Matrices lie row after row, of a diagonal Q or R the diagonal alone."""
+    """The parts of a program's numbers. Counters, weights, tail, plan and states are kept from call to call; the rest is
+    written before it is read. Matrices are stored row by row, a diagonal Q or R as its diagonal alone."""
 
     counters: Any
     """Counters of the law; they come first."""
     weights: Any
     """Q, R, R^-1, P (36)."""
     tail: Any
-    """The feedback (18) for the move that a shifted plan lacks."""
+    """The feedback (18) for the last move of a shifted plan."""
     motion: Any
     """A (36), B (18)."""
     limits: Any
@@ -57,9 +57,9 @@ class Store(NamedTuple):
     gradient: Any
     """The gradient of half the cost with respect to each move (3 each)."""
     step: Any
-    """A step of each move (3 each), to which the feedback adds."""
+    """The step of each move (3 each), to which the feedback adds."""
     feedback: Any
-    """The feedback of each move to a change of the state before it (18 each)."""
+    """The feedback of each move on a change of the state before it (18 each)."""
     stiffness: Any
     """The trace of each move's curvature."""
     trial: Any
@@ -69,7 +69,7 @@ class Store(NamedTuple):
     multipliers: Any
     """Multipliers of the limits, in the interior-point method (3 each)."""
     spare: Any
-    """A plan put aside (3 each)."""
+    """A stored plan (3 each)."""
 
 
 def _sizes(n: Index, *, dense: bool) -> Store:
@@ -96,20 +96,20 @@ def _sizes(n: Index, *, dense: bool) -> Store:
 
 
 def carve(problem: Problem) -> Store:
-    """Return the parts of a program's numbers: nothing is copied."""
+    """Return the parts of a program's numbers as views; nothing is copied."""
     sizes = _sizes(problem.horizon, dense=problem.dense)
     starts = accumulate(sizes, initial=0)
     return Store(*(problem.numbers.part(start, size) for start, size in zip(starts, sizes, strict=False)))
 
 
 def size(horizon: int, *, dense: bool = False) -> int:
-    """Return how many numbers a program of that many moves has."""
+    """Return the number of numbers in a program of that many moves."""
     *_, end = accumulate(_sizes(horizon, dense=dense))
     return end
 
 
 class Weights(NamedTuple):
-    """The weights are Q and R, full or as their diagonals, the inverse of R, and P."""
+    """The weights Q and R, full or as their diagonals, the inverse of R, and P."""
 
     q: Weight
     r: Weight

@@ -1,7 +1,7 @@
-"""Matrices and vectors of six and three numbers are tuples, written out term by term.
+"""Operations on matrices and vectors of six and three numbers, which are tuples, written out term by term.
 
-Sums of six begin with the number that they are added to, and run in order of the columns; those of three are the plain
-ones of `algebra.vector`. A vector in place of a matrix of weights stands for a diagonal one.
+Sums of six terms begin with the number to which they are added, in the order of columns; sums of three are those of
+`algebra.vector`. A vector in place of a matrix of weights stands for a diagonal one.
 """
 
 from __future__ import annotations
@@ -70,10 +70,10 @@ def form(m: Weight, x: Sequence[Scalar]) -> Scalar:
 
 
 def triple(buffer: Buffer, k: Index) -> Vector:
-    """Return the k-th three numbers of a buffer."""
+    """Return the k-th group of three numbers of a buffer."""
     return (buffer[3 * k], buffer[3 * k + 1], buffer[3 * k + 2])
 
 
 def matrix(buffer: Buffer, width: int) -> Rows:
-    """A buffer holds a matrix row after row."""
+    """Return the matrix that a buffer holds row by row, of rows of `width`."""
     return tuple(buffer.row(i, width) for i in range(buffer.size // width))

@@ -1,9 +1,9 @@
-"""Solves quadratic programs of predictive control by equations: no allocation, no library, and bounded work.
+"""Solves quadratic programs of predictive control by equations, with bounded work and without allocation or libraries.
 
-The method is a projected Newton method of two metrics (Bertsekas 1982, "Projected Newton methods for optimization problems
-with simple constraints"). Moves that press against a limit are held there, on a ball with the curvature of the sphere; the
-others take the Newton step, which one backward Riccati sweep gives in time proportional to N. The step is flown with its
-feedback through the limits, so later moves already respond to those that were limited; where that does not reduce the cost,
+The method is a two-metric projected Newton method (Bertsekas 1982, "Projected Newton methods for optimization problems with
+simple constraints"). Moves that press against a limit are fixed there (on a ball, with the curvature of the sphere); the
+others take the Newton step, computed by one backward Riccati sweep in time proportional to N. The step is simulated with
+its feedback and the limits, so later moves already respond to those that were limited; where that does not reduce the cost,
 a search along the projected line does. Programs on which this is slow go to an interior-point method, whose result is the
 next start; a scaled gradient step, which always descends, is the last resort. A run ends when the optimality gap is proved
 small: for multipliers of the right sign, strong convexity bounds the gap of half the cost by g'R^-1 g / 2, with g the
@@ -28,19 +28,19 @@ from starhold.laws.predictive.sixes import triple
 TOLERANCE = 1e-16
 """Relative gap of the objective at which a solution is accepted."""
 STALLED = 1e-12
-"""Relative decrement below which a plan that cannot be improved counts as solved."""
+"""Relative Newton decrement below which a plan that cannot be improved counts as solved."""
 ENOUGH = 0.25
-"""Share of the Newton decrement that the flown step must bring to be taken without a search."""
+"""Share of the Newton decrement by which the simulated step must reduce the cost to be taken without a search."""
 SUFFICIENT = 1e-4
-"""Share of the decrease promised by the slope that a step must bring."""
+"""Share of the decrease predicted by the slope that a step must achieve."""
 HALVINGS, MOST_HALVINGS = 8, 60
-"""Lengths tried along the Newton step, and along the gradient."""
+"""Most lengths tried along the Newton step, and along the gradient."""
 PATIENCE = 12
 """Sweeps without a solution after which the interior-point method takes over."""
 
 
 class Solved(NamedTuple):
-    """A run gives the number of Riccati sweeps, whether the optimum was reached, and whether limits shape it."""
+    """Result of a run: the number of Riccati sweeps, whether the optimum was reached, and whether limits are active."""
 
     sweeps: Scalar
     solved: Truth
@@ -48,8 +48,8 @@ class Solved(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """The progress of a run is half the cost of the plan, the sweeps so far, whether the interior-point method has been
-    used, whether the run is over, and the fields of `Solved` at that time."""
+    """Progress of a run: half the cost of the plan, the sweeps so far, whether the interior-point method has been used,
+    whether the run is over, and the fields of `Solved` so far."""
 
     half: Scalar
     sweeps: Scalar
@@ -60,15 +60,15 @@ class Progress(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """The result of a Newton step, and whether the interior-point method is to be used."""
+    """Result of a Newton step, and whether the interior-point method is to be used."""
 
     progress: Progress
     rescue: Truth
 
 
 def improve(problem: Problem, budget: Index, warm: Truth) -> Solved:
-    """Solve the program from the first of its states, starting with its plan if warm; the plan is overwritten. At most
-    `budget` sweeps are made; the plan respects the limits in any case."""
+    """Solve the program from its first state, starting from its plan if `warm`; the plan is overwritten. At most `budget`
+    sweeps are made; the plan respects the limits in any case."""
 
     def fly_freely(_sweeps: Scalar, _cut: Truth) -> tuple[Scalar, Truth]:
         return 1.0, _fly_freely(problem)
@@ -82,7 +82,7 @@ def improve(problem: Problem, budget: Index, warm: Truth) -> Solved:
 
 
 def _fly_freely(problem: Problem) -> Truth:
-    """Fly the policy without limits through the limits, and tell whether they cut it: if not, it is the optimum."""
+    """Simulate the unlimited policy with the limits; if they cut no move, it is the optimum."""
     store = carve(problem)
 
     def clear(k: Index) -> None:
@@ -101,7 +101,7 @@ def _fly_freely(problem: Problem) -> Truth:
 
 
 def _descend(problem: Problem, budget: Index, sweeps: Scalar) -> Solved:
-    """Improve the plan until it is the optimum or the sweeps are used up."""
+    """Improve the plan until it is optimal or the sweeps are used up."""
 
     def over(now: Progress) -> Truth:
         return now.over
@@ -110,7 +110,7 @@ def _descend(problem: Problem, budget: Index, sweeps: Scalar) -> Solved:
         return (_turn(problem, budget, now),)
 
     begun = Progress(rollout(problem), sweeps, False, False, False, True)
-    # Each turn but the last makes a sweep.
+    # Each iteration except the last makes a sweep.
     (end,) = until(over, turn, begun, at_most=budget + 1)
     # A plan that is not finite must not start the next one.
     return Solved(end.sweeps, end.solved, both(end.shaped, is_finite(end.half)))
@@ -129,7 +129,7 @@ def _turn(problem: Problem, budget: Index, now: Progress) -> Progress:
 
 
 def _better(problem: Problem, budget: Index, now: Progress) -> Progress:
-    """Take a Newton step, or the interior-point method where that does not serve."""
+    """Take a Newton step, or use the interior-point method where that fails."""
 
     def newton(_tried: Attempt) -> tuple[Attempt]:
         return (_newton(problem, budget, now),)
@@ -157,7 +157,7 @@ def _newton(problem: Problem, budget: Index, now: Progress) -> Attempt:
     sweeps = now.sweeps + 1.0
     trial = follow(problem, REST)
     none_held = less_equal(holding, 0.0)
-    # Flown as it is, the step gives the exact optimum of the free moves; on a ball only where all are free.
+    # The simulated step gives the exact optimum of the free moves; on a ball only if all moves are free.
     free = opposite(trial.cut)
     free = both(free, none_held) if problem.ball else free
     change = where(free, -(0.5 * decrement), trial.change)
@@ -183,15 +183,15 @@ def _is_zero(x: Scalar) -> Truth:
 
 
 def _search(problem: Problem) -> Scalar:
-    """Make a trial plan along the Newton step without limits; gives the change of half the cost, zero where none was
-    found."""
+    """Make a trial plan along the Newton step without limits; return the change of half the cost, zero if there is no
+    decrease."""
     unroll(problem)
     return shorten(problem, float(HALVINGS))
 
 
 def _gradient_step(problem: Problem) -> Scalar:
-    """Make a trial plan along the gradient, each move in its own scale: the projection guarantees descent for short
-    steps. Gives the change of half the cost, zero where rounding hides any."""
+    """Make a trial plan along the gradient, with a scale for each move: the projection guarantees descent for short steps.
+    Return the change of half the cost, zero where rounding hides any."""
     store = carve(problem)
 
     def stage(k: Index) -> None:
@@ -203,8 +203,8 @@ def _gradient_step(problem: Problem) -> Scalar:
 
 @function
 def shorten(problem: Problem, halvings: Scalar) -> Scalar:
-    """Search along the projection arc of the step (Armijo), halved `halvings` times at most, until the cost decreases
-    enough. Gives the change of half the cost, zero if it never does."""
+    """Search along the projection arc of the step (Armijo), halved at most `halvings` times, until the cost decreases
+    enough. Return the change of half the cost, zero if it never does."""
     store = carve(problem)
 
     def over(_length: Scalar, change: Scalar, left: Scalar) -> Truth:
@@ -220,7 +220,7 @@ def shorten(problem: Problem, halvings: Scalar) -> Scalar:
 
 
 def advance(problem: Problem) -> None:
-    """Shift a solved plan by one move; the tail's feedback gives the last one."""
+    """Shift a solved plan by one move; the feedback of the tail gives the last one."""
     store, bounds, n = carve(problem), limits(problem), problem.horizon
     against = [-x for x in store.states.row(n, 6)]
     last: Vector = (

@@ -1,4 +1,4 @@
-"""A first-order lag, within a largest rate of change."""
+"""A first-order lag with a rate limit."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class Params(NamedTuple):
 
 
 def rates(output: Vector, target: Vector, begun: Vector, substep: Scalar, params: Params) -> Vector:
-    """d(output)/dt towards the command."""
+    """Return d(output)/dt towards the command."""
     return clip_axes(scale(1.0 / params.lag, subtract(target, output)), params.rate_limit)
 
 
 def fastest(params: Params) -> float:
-    """The fastest rate (1/s) at which it settles, which the integration must resolve."""
+    """Return the fastest rate (1/s) at which it settles, which the integration must resolve."""
     return 1.0 / params.lag
 
 
@@ -45,5 +45,5 @@ def late(params: Params, period: float) -> Late:
 
 
 def examples() -> list[Params]:
-    """A quick one, and one whose rate is limited."""
+    """Return a fast lag, and one with a rate limit."""
     return [Params(0.3), Params(0.3, 0.02)]

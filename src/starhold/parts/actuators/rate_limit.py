@@ -1,4 +1,4 @@
-"""A largest rate of change of the command, without lag."""
+"""A rate limit on the command, without lag."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ BODY = ""
 
 
 class Params(NamedTuple):
-    """The limit of the output's rate of change."""
+    """The rate limit of the output."""
 
     rate_limit: Annotated[float, Parameter("N m/s", above=0.0, text="largest rate of each component")]
 
 
 def rates(output: Vector, target: Vector, begun: Vector, substep: Scalar, params: Params) -> Vector:
-    """d(output)/dt: the straight line from the output at the start of the substep to the command, or as far towards it as
-    the limit lets."""
+    """Return d(output)/dt: the straight line from the output at the start of the substep to the command, or as far towards
+    it as the limit allows."""
     return clip_axes(scale(1.0 / substep, subtract(target, begun)), params.rate_limit)
 
 
@@ -36,5 +36,5 @@ def late(params: Params, period: float) -> Late:
 
 
 def examples() -> list[Params]:
-    """A slow one."""
+    """Return a slow one."""
     return [Params(0.02)]

@@ -1,1 +1,1 @@
-"""Bodies: equations of motion and what laws measure, one per file."""
+"""Bodies: equations of motion and the measurements of laws, one per file."""

@@ -1,9 +1,10 @@
-"""Motion near a collinear libration point of two bodies on circles about each other: the state, the linear model, the full
-restricted three-body problem, and the numbers of real pairs.
+"""Motion near a collinear libration point of two bodies on circular orbits about each other: the state, the linear model,
+the full restricted three-body problem, and the constants of real pairs.
 
-Axes: X from the larger body to the smaller one (at L2 away from the Sun), Y along the smaller body's motion, Z completes;
-they turn with the two bodies, and the libration point is the origin. Scaled units: the unit of time is 1/Omega, so that a
-revolution of the two bodies takes 2 pi; the unit of length is the caller's, by default the Earth's diameter (`Units`).
+Axes: X from the larger body to the smaller one (at L2 away from the Sun), Y along the smaller body's motion, Z completes
+the triad; they turn with the two bodies, and the origin is the libration point. Scaled units: the unit of time is 1/Omega,
+so that a revolution of the two bodies takes 2 pi; the unit of length is the caller's, by default the Earth's diameter
+(`Units`).
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ TIME_UNIT = "1/Omega"
 SIGN_POLICIES: dict[str, Callable[..., Any]] = {}
 
 EARTH_DIAMETER = 12_742_000.0
-"""m: the default unit of length."""
+"""The default unit of length (m)."""
 POINTS = ("L1", "L2", "L3")
 """L1 lies between the two bodies, L2 beyond the smaller one, L3 beyond the larger one."""
 
 
 class Libration(NamedTuple):
-    """The numbers of a libration point in scaled units; the pulls add up to the stiffness."""
+    """The constants of a libration point in scaled units; the pulls add up to the stiffness."""
 
     rate: Annotated[float, Quantity("Omega", "at which the axes turn: 1")]
     stiffness: Annotated[float, Quantity("Omega^2", "C of the linear model; the c2 of the literature")]
@@ -50,8 +51,8 @@ class Libration(NamedTuple):
 
 
 class PointState(NamedTuple):
-    """Position, velocity, and the acceleration that the control gives, which has dynamics of its own where the control
-    surfaces lag; all in the rotating axes from the libration point, scaled."""
+    """Position, velocity and control acceleration in the rotating axes, relative to the libration point, scaled. The
+    control acceleration has its own dynamics if the actuators lag."""
 
     position: Vector
     velocity: Vector
@@ -82,7 +83,7 @@ ROWS: Any = rows(PointState(ZERO, ZERO, ZERO))
 
 
 def linear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
-    """Acceleration without control, to first order in the distance from the point (scaled)."""
+    """Return the acceleration without control, to first order in the distance from the point (scaled)."""
     turning, square = 2.0 * plant.rate, plant.rate * plant.rate
     return (
         turning * velocity[1] + (square + 2.0 * plant.stiffness) * position[0],
@@ -92,10 +93,10 @@ def linear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
 
 
 def nonlinear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
-    """Acceleration without control in the circular restricted three-body problem (scaled).
+    """Return the acceleration without control in the circular restricted three-body problem (scaled).
 
-    The forces at the point itself, which cancel, are left out before they are computed, so that the result is exactly zero
-    there and as accurate near it as far away."""
+    The forces at the point itself, which cancel, are eliminated analytically, so the result is exactly zero there and as
+    accurate near it as far away."""
     turning, square = 2.0 * plant.rate, plant.rate * plant.rate
     tide = add(
         _tide(position, plant.from_larger, plant.pull_larger), _tide(position, plant.from_smaller, plant.pull_smaller)
@@ -108,10 +109,10 @@ def nonlinear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
 
 
 def _tide(position: Vector, distance: Scalar, pull: Scalar) -> Vector:
-    """The attraction of a body less its attraction at the origin, which lies `distance` along X from the body.
+    """Return the attraction of a body minus its attraction at the origin, which lies `distance` along X from the body.
 
-    With D the body's distance vector to the origin and |D + r|2 = D2 (1 + q) it is pull (D ((1+q)^1.5 - 1) - r)/(1+q)^1.5;
-    the difference in it as Encke and Battin write it (An Introduction to the Mathematics and Methods of Astrodynamics, 8.6).
+    With D the vector from the body to the origin and |D + r|^2 = D^2 (1 + q) it is pull (D ((1+q)^1.5 - 1) - r)/(1+q)^1.5;
+    the difference is written as by Encke and Battin (An Introduction to the Mathematics and Methods of Astrodynamics, 8.6).
     """
     q, s = _stretch(position, distance)
     cube = s * s * s
@@ -121,46 +122,46 @@ def _tide(position: Vector, distance: Scalar, pull: Scalar) -> Vector:
 
 
 def _stretch(position: Vector, distance: Scalar) -> tuple[Scalar, Scalar]:
-    """q and sqrt(1 + q), by which the distance to a body has grown."""
+    """Return q and sqrt(1 + q), the ratio of the distance to a body to that of the origin."""
     inverse = 1.0 / distance
     q = inverse * (2.0 * position[0] + inverse * dot(position, position))
     return q, sqrt(1.0 + q)
 
 
 def motion(state: PointState, acceleration: Vector, control_rate: Vector | None) -> tuple[Vector, Vector, Vector | None]:
-    """d(state)/dt under the acceleration of `linear` or `nonlinear` and the control the state holds, which changes at the
-    given rate (None: held)."""
+    """Return d(state)/dt under the acceleration of `linear` or `nonlinear` and the control in the state, which changes at
+    the given rate (None: held)."""
     return (state.velocity, add(acceleration, state.control), control_rate)
 
 
 def rates(state: PointState, loads: Loads, control_rate: Vector | None, craft: Libration) -> Any:
-    """d(state)/dt under the field and the control."""
+    """Return d(state)/dt under the field and the control."""
     return motion(state, loads.acceleration or ZERO, control_rate)
 
 
 def renormalised(state: PointState) -> PointState:
-    """The state, which has no constraints."""
+    """Return the state, which has no constraints."""
     return state
 
 
 def is_sound(state: PointState, setup: Any) -> Truth:
-    """Whether the motion is finite and within the divergence bound."""
+    """Return whether the motion is finite and within the divergence bound."""
     near = less(dot(state.position, state.position), setup.divergence_bound * setup.divergence_bound)
     return both(is_finite(dot(state.velocity, state.velocity)), near)
 
 
 def observe(state: PointState, scene: Scene) -> PointMeasurement:
-    """The law's measurement of a state as sensors or estimators give it."""
+    """Return the law's measurement of a state from sensors or estimators."""
     return PointMeasurement(state.position, state.velocity, scene.period, scene.limit)
 
 
 def sample(state: PointState, goal: None, applied: Vector, command: Vector) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.position, state.velocity, applied, command)
 
 
 class Units(NamedTuple):
-    """The worth of one scaled unit: length (m) and rate (1/s)."""
+    """The size of the scaled units of length (m) and rate (1/s)."""
 
     length: float
     rate: float
@@ -172,18 +173,18 @@ class Units(NamedTuple):
 
     @property
     def velocity(self) -> float:
-        """m/s in a unit of velocity."""
+        """The unit of velocity in m/s."""
         return self.length * self.rate
 
     @property
     def acceleration(self) -> float:
-        """m/s2 in a unit of acceleration."""
+        """The unit of acceleration in m/s2."""
         return self.length * self.rate**2
 
 
 class Primaries(NamedTuple):
-    """Two bodies on circles about each other: their name, GM of the larger and of the smaller one (m3/s2), the distance
-    between them (m) and their radii (m)."""
+    """Two bodies on circular orbits about each other: their name, GM of the larger and the smaller body (m3/s2), their
+    distance (m) and radii (m)."""
 
     name: str
     larger: float
@@ -203,11 +204,11 @@ class Primaries(NamedTuple):
         return 2.0 * math.pi / self.rate
 
     def units(self, length_unit_m: float = EARTH_DIAMETER) -> Units:
-        """The scaled units of this pair."""
+        """Return the scaled units of this pair."""
         return Units(length_unit_m, self.rate)
 
     def point(self, point: str = "L2", length_unit_m: float = EARTH_DIAMETER) -> Libration:
-        """A libration point of this pair; see `make_libration`."""
+        """Return a libration point of this pair; see `make_libration`."""
         return make_libration(self.larger, self.smaller, self.separation, point, length_unit_m)
 
 
@@ -224,15 +225,15 @@ PRIMARIES: dict[str, Primaries] = {
     "sun-jupiter": Primaries("Sun and Jupiter", _SUN, 1.267127641e17, 5.20288700 * AU, _SUN_RADIUS, 6.9911e7),
     "earth-moon": Primaries("Earth and Moon", _EARTH, _MOON, 3.844e8, 6.371e6, 1.7374e6),
 }
-"""By name. GM from the ephemeris DE440 (Park et al. 2021; planets with their moons), mean distances from JPL's approximate
-elements of the planets (Standish), radii: IAU 2015. With the Moon or without, the Earth has C = 3.94 at L2."""
+"""Pairs by name. GM from the ephemeris DE440 (Park et al. 2021; planets with their moons), mean distances from JPL's
+approximate elements of the planets (Standish), radii: IAU 2015. With the Moon or without, the Earth has C = 3.94 at L2."""
 
 
 def make_libration(
     larger_mass: float, smaller_mass: float, separation_m: float, point: str = "L2", length_unit_m: float = EARTH_DIAMETER
 ) -> Libration:
-    """A collinear libration point of two bodies with these masses (kg, or GM in m3/s2: only their ratio counts) at this
-    distance (m), in scaled units; the place is computed to the last digit.
+    """Return a collinear libration point of two bodies with these masses (kg, or GM in m3/s2: only their ratio matters) at
+    this distance (m), in scaled units; its position is correct to the last digit.
 
     Raises ValueError where a number is not positive and finite, the masses are the wrong way round, or there is no such
     point."""
@@ -253,10 +254,10 @@ def make_libration(
 
 
 def _place(share: float, rest: float, point: str) -> tuple[float, float]:
-    """Where the point lies along X as seen from the larger and from the smaller body, in units of their distance; `share`
-    and `rest` are the smaller and the larger body's parts of the mass.
+    """Return the point's coordinate along X from the larger and from the smaller body, in units of their distance; `share`
+    and `rest` are the mass fractions of the smaller and the larger body.
 
-    The balance of forces is written for the distance from the nearer body, without differences of near numbers."""
+    The balance of forces is written in the distance from the nearer body, which avoids cancellation."""
     if point == "L3":
         distance = rising(lambda g: g * (1.0 + share / g) - rest / (g * g) - share / ((1.0 + g) * (1.0 + g)), 0.5, 1.5)
         return -distance, -1.0 - distance

@@ -27,8 +27,8 @@ COMMAND = "torque"
 
 
 class State(NamedTuple):
-    """Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and the
-    torque the actuators give (body, N m), which has dynamics of its own when the actuators lag."""
+    """Attitude q_BN (inertial to body), rate omega_BN_B (rad/s), position and velocity (inertial; m, m/s), and the torque
+    of the actuators (body, N m), which has its own dynamics if the actuators lag."""
 
     attitude: Quaternion
     rate: Vector
@@ -48,12 +48,12 @@ class Measurement(NamedTuple):
     rate: Annotated[Vector, Quantity("rad/s", "angular velocity relative to the target")]
     body_rate: Annotated[Vector, Quantity("rad/s", "absolute angular velocity")]
     target_rate: Annotated[Vector, Quantity("rad/s", "the target's angular velocity")]
-    target_acceleration: Annotated[Vector, Quantity("rad/s^2", "derivative of target_rate as the turning body sees it")]
+    target_acceleration: Annotated[Vector, Quantity("rad/s^2", "derivative of target_rate in the rotating body axes")]
     external_torque: Annotated[Vector, Quantity("N m", "modelled torque from outside at this attitude")]
     position: Annotated[Vector, Quantity("m", "from the centre of attraction")]
     period: Annotated[float, Quantity("s", "for which the torque will be held")]
     wheel_momentum: Annotated[Vector, Quantity("N m s", "angular momentum of the body's wheels")] = ZERO
-    magnetic_field: Annotated[Vector, Quantity("T", "as a magnetometer tells it; zero without one")] = ZERO
+    magnetic_field: Annotated[Vector, Quantity("T", "as a magnetometer measures it; zero without one")] = ZERO
     time: Annotated[float, Quantity("s", 'since the start, for laws with `READS = ("time",)`; others must not use it')] = 0.0
     is_valid: Annotated[
         float,
@@ -78,16 +78,15 @@ TIME_UNIT = "s"
 
 
 def angular_acceleration(rate: Vector, torque: Vector, craft: Craft) -> Vector:
-    """Euler's equation solved for the rate's derivative (rad/s2): J w' = torque - w x J w."""
+    """Return w' (rad/s2) from Euler's equation J w' = torque - w x J w."""
     return apply(craft.inverse_inertia, subtract(torque, gyroscopic_torque(craft.inertia, rate)))
 
 
 def motion(
     state: State, torque: Vector, acceleration: Vector, torque_rate: Vector | None, craft: Craft, more: Any = None
 ) -> tuple[Quaternion, Vector, Vector, Vector, Vector | None]:
-    """d(state)/dt under the total torque (body), the acceleration of the centre of mass (inertial) and the rate of the
-    actuator torque (None: held), in the order of State. more: the inertia (3, 3; kg m2) that effectors add by back-
-    substitution."""
+    """Return d(state)/dt under the total torque (body), the acceleration of the centre of mass (inertial) and the rate of
+    the actuator torque (None: held). more: the inertia (3, 3; kg m2) that effectors add by back-substitution."""
     turning = derivative(state.attitude, state.rate)
     if more is None:
         spin = angular_acceleration(state.rate, torque, craft)
@@ -97,8 +96,8 @@ def motion(
 
 
 def rates(state: State, loads: Loads, torque_rate: Vector | None, craft: Craft) -> Any:
-    """d(state)/dt under all loads on the body. Where an effector takes the command, the actuators' torque acts on it
-    alone."""
+    """Return d(state)/dt under all loads on the body. If an effector takes the command, the actuators' torque acts only on
+    it."""
     torque = state.torque if loads.reaction is None else loads.reaction
     if loads.reaction is not None and loads.direct:
         torque = add(state.torque, torque)
@@ -108,24 +107,24 @@ def rates(state: State, loads: Loads, torque_rate: Vector | None, craft: Craft) 
 
 
 def renormalised(state: State) -> State:
-    """The state with its quaternion brought back to unit length."""
+    """Return the state with its quaternion renormalised."""
     return state._replace(attitude=renormalise(state.attitude))
 
 
 def is_sound(state: State, setup: Any) -> Truth:
-    """Whether the motion is finite, and turns by less than a radian in a substep."""
+    """Return whether the motion is finite, and turns by less than a radian in a substep."""
     turn = setup.substep * setup.substep * dot(state.rate, state.rate)
     finite = both(is_finite(state.attitude[0]), is_finite(dot(state.position, state.position)))
     return both(less(turn, 1.0), finite)
 
 
 def side_of(state: State, goal: Goal) -> float:
-    """The sign of the scalar part of the error quaternion: which of q and -q the quaternion policy begins with."""
+    """Return the sign of the scalar part of the error quaternion, with which the sign policy begins."""
     return side(relative(goal.attitude, state.attitude)[0])
 
 
 def observe(state: State, scene: Scene) -> Measurement:
-    """The law's measurement of a state as sensors or estimators give it."""
+    """Return the law's measurement of a state from sensors or estimators."""
     goal = scene.goal
     error = relative(goal.attitude, state.attitude)
     position = to_body(state.attitude, state.position)
@@ -133,7 +132,7 @@ def observe(state: State, scene: Scene) -> Measurement:
     time, is_valid = (getattr(scene.readings, name, ABSENT) for name in (CLOCK, IS_VALID))
     known: Any = (scene.torque, position, scene.period, scene.momentum, field, time, is_valid)
     if scene.still:
-        # The arithmetic on the zeros of a target at rest is left out here, for a compiler must not drop it.
+        # The arithmetic on the zeros of a target at rest is skipped here, because a compiler must not drop it.
         return Measurement(error, state.rate, state.rate, ZERO, ZERO, *known)
     target_rate, target_acceleration = to_body(error, goal.rate), to_body(error, goal.acceleration)
     error_rate = subtract(state.rate, target_rate)
@@ -142,20 +141,21 @@ def observe(state: State, scene: Scene) -> Measurement:
 
 
 def sample(state: State, goal: Goal, applied: Vector, command: Vector) -> Sample:
-    """The recorded quantities; applied: the torque that acts on the body (N m), of wheels that of motors and friction."""
+    """Return the recorded quantities; applied: the torque on the body (N m), which for wheels is that of motors and
+    friction."""
     error = relative(goal.attitude, state.attitude)
     rate = subtract(state.rate, to_body(error, goal.rate))
     return Sample(state.attitude, state.rate, state.position, state.velocity, applied, command, error, rate)
 
 
 def _plus(a: Any, b: Any) -> Any:
-    """The sum of two inertias; the first may be three moments."""
+    """Return the sum of two inertias; the first may be three moments."""
     full = a if isinstance(a[0], tuple) else ((a[0], 0.0, 0.0), (0.0, a[1], 0.0), (0.0, 0.0, a[2]))
     return tuple(add(x, y) for x, y in zip(full, b, strict=True))
 
 
 def solve_symmetric(m: Any, v: Vector) -> Vector:
-    """Solve M x = v for a symmetric 3x3 matrix, by cofactors."""
+    """Return the x with M x = v for a symmetric 3x3 matrix, by cofactors."""
     (a, b, c), (_, d, e), (_, _, f) = m
     p, q, r = d * f - e * e, c * e - b * f, b * e - c * d
     s = 1.0 / (a * p + b * q + c * r)
@@ -165,5 +165,5 @@ def solve_symmetric(m: Any, v: Vector) -> Vector:
 
 
 def kinetic_energy(rate: Vector, craft: Craft) -> Scalar:
-    """Rotational energy (J)."""
+    """Return the rotational energy (J)."""
     return 0.5 * dot(rate, apply(craft.inertia, rate))

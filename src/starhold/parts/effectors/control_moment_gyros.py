@@ -1,4 +1,4 @@
-"""Control-moment gyros whose rotors change their speed too: their steering, their motion, and their torque on the body.
+"""Variable-speed control-moment gyros: their steering, their motion, and their torque on the body.
 
 Each unit has a gimbal about an axis g fixed in the body, and in it a rotor about s, which turns with the gimbal; t = g x s.
 With h the momentum of the rotor relative to the body about s, Js, Jt, Jg the moments of gimbal and rotor together about s,
@@ -8,9 +8,9 @@ t and g, Jr the rotor's about s, w_s and w_t the body's rate about s and t, p = 
 
 hold exactly, and the body feels -(rotor motor) s - x' b - (gimbal motor + p w_t) g with b = p t + (Js - Jr - Jt) w_t s.
 
-Gimbal rates and rotor torques, each as a share y of its limit, are steered to give the wanted torque with the least sum
-of y^2 of the gimbals and y^2 / weight of the rotors. The weight is small but next to singularities of the gimbals:
-there, where no gimbal has torque in some direction, the rotors' axes have it."""
+The steering gives the wanted torque with gimbal rates and rotor torques, each as a share y of its limit, that minimise the
+sum of y^2 of the gimbals and y^2 / weight of the rotors. The weight is small except near singularities of the gimbals,
+where the gimbals have no torque in some direction and the rotors supply it."""
 
 from __future__ import annotations
 
@@ -75,14 +75,14 @@ COLUMNS = (
     "momentum",
 )
 PERPENDICULAR = 1e-6
-"""Cosine of the angle from which axes do not count as perpendicular."""
+"""Cosine of the angle from which on axes do not count as perpendicular."""
 FLOOR = 1e-12
-"""This keeps the steering finite where neither gimbals nor rotors have torque in some direction, as a share of the mean
-square torque."""
+"""Regularisation, as a share of the mean square torque, that keeps the steering finite where neither gimbals nor rotors
+have torque in some direction."""
 
 
 class Params(NamedTuple):
-    """A row for each unit, and how it is steered."""
+    """A row for each unit, and the parameters of the steering."""
 
     units: Annotated[
         tuple[tuple[float, ...], ...],
@@ -110,9 +110,9 @@ class Params(NamedTuple):
 
 
 class Unit(NamedTuple):
-    """A unit as equations take it: unit axes of the gimbal, and spin and transverse ones at angle zero; the rotor's moment,
-    the moments of the unit about spin, transverse and gimbal axis (kg m2), and that about the gimbal inverted; limits of the
-    gimbal's rate (rad/s) and motor (N m)."""
+    """A unit in the form that equations take: unit vectors of the gimbal axis, and of the spin and transverse axes at angle
+    zero; the rotor's moment, the unit's moments about spin, transverse and gimbal axis (kg m2), and the inverse of the
+    last; limits of the gimbal's rate (rad/s) and motor (N m)."""
 
     gimbal: Vector
     spin: Vector
@@ -127,8 +127,8 @@ class Unit(NamedTuple):
 
 
 class Prepared(NamedTuple):
-    """The units, their rotors with the limits of these, the state at the start, the mean square torque of the gimbals about
-    an axis at their largest rate (N2 m2) and the inverse of its cube, and how they are steered."""
+    """The units, their rotors with their limits, the initial state, the mean square torque of the gimbals about an axis at
+    their largest rate (N2 m2) and the inverse of its cube, and the parameters of the steering."""
 
     units: tuple[Unit, ...]
     rotors: Wheels
@@ -150,11 +150,11 @@ class State(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """The quantities that are recorded of the units."""
+    """The recorded quantities of the units."""
 
     gimbal_angle: Annotated[Numbers, Quantity("rad", "angle of each gimbal", "gyro")]
     gimbal_rate: Annotated[Numbers, Quantity("rad/s", "rate of each gimbal", "gyro")]
-    gimbal_rate_command: Annotated[Numbers, Quantity("rad/s", "rate asked of each gimbal", "gyro")]
+    gimbal_rate_command: Annotated[Numbers, Quantity("rad/s", "commanded rate of each gimbal", "gyro")]
     gimbal_torque: Annotated[Numbers, Quantity("N m", "torque of each gimbal's motor", "gyro")]
     rotor_momentum: Annotated[Numbers, Quantity("N m s", "momentum of each rotor relative to the body", "gyro")]
     rotor_torque: Annotated[Numbers, Quantity("N m", "torque of each rotor's motor", "gyro")]
@@ -162,8 +162,8 @@ class Sample(NamedTuple):
 
 
 class Turned(NamedTuple):
-    """A unit at its gimbal angle has spin and transverse axes, the body's rate about the second (rad/s), the torque
-    that the body loses for a unit of gimbal rate (N m s), and the moment of the turning body on the gimbal (N m)."""
+    """A unit at its gimbal angle: spin and transverse axes, the body's rate about the transverse axis (rad/s), minus the
+    torque on the body per unit of gimbal rate (N m s), and the moment of the turning body on the gimbal (N m)."""
 
     unit: Unit
     spin: Vector
@@ -174,7 +174,7 @@ class Turned(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Prepared:
-    """The numbers that equations take. ValueError for units that cannot be, or that do not act about three axes."""
+    """Return the numbers that equations take. Raise ValueError for units that cannot be, or lack torque about an axis."""
     units: list[Unit] = []
     reach, squares = np.zeros((3, 3)), 0.0
     for number, row in enumerate(params.units, 1):
@@ -223,17 +223,17 @@ def _unit(number: int, row: tuple[float, ...]) -> Unit:
 
 
 def remember(params: Prepared) -> State:
-    """The state at the start: gimbals at rest at their angles."""
+    """Return the initial state: gimbals at rest at their angles."""
     return params.start
 
 
 def command(applied: Vector, params: Prepared) -> Vector:
-    """The wanted torque on the body (N m): how it is steered depends on where the gimbals are."""
+    """Return the wanted torque on the body (N m): its steering depends on the gimbal angles."""
     return applied
 
 
 def turned(state: State, rate: Vector, params: Prepared) -> tuple[Turned, ...]:
-    """The units at their gimbal angles, on a body that turns at this rate (rad/s)."""
+    """Return the units at their gimbal angles, on a body that turns at this rate (rad/s)."""
     return each(_turned, (params.units, state.angle, state.momentum), rate)
 
 
@@ -257,13 +257,13 @@ class Steered(NamedTuple):
 
 
 def steer(units: tuple[Turned, ...], wanted: Vector, params: Prepared) -> Steered:
-    """Gimbal rates (rad/s) and rotor torques (N m) that together give the body this torque (N m); where one would
-    exceed its limit all are reduced alike, so that the torque keeps its direction."""
+    """Return the gimbal rates (rad/s) and rotor torques (N m) that together give the body this torque (N m); if one would
+    exceed its limit, all are scaled down, so that the torque keeps its direction."""
     turning = tuple(scale(one.unit.rate_limit, one.column) for one in units)
     driving = tuple(scale(limit, one.spin) for limit, one in zip(params.rotors.torque_limit, units, strict=True))
     by_gimbals = _gram(turning)
     size = determinant(by_gimbals) * params.cube
-    # A power of a fraction in place of the published exponential: a loop with it has a slope that can be read off.
+    # A power of a fraction in place of the published exponential: it can be differentiated as a rational function.
     share = params.singularity / (params.singularity + maximum(size, 0.0))
     share = share * share
     share = share * share
@@ -280,7 +280,7 @@ def steer(units: tuple[Turned, ...], wanted: Vector, params: Prepared) -> Steere
 
 
 def _gram(columns: tuple[Vector, ...]) -> Matrix:
-    """The sum of a a^T."""
+    """Return the sum of a a^T."""
 
     def row(axis: int) -> Vector:
         total = ZERO
@@ -292,7 +292,7 @@ def _gram(columns: tuple[Vector, ...]) -> Matrix:
 
 
 def motors(state: State, units: tuple[Turned, ...], wanted: Vector, params: Prepared) -> tuple[Numbers, Numbers]:
-    """The torques of the gimbals' motors and of the rotors' motors (N m)."""
+    """Return the torques of the gimbals' motors and of the rotors' motors (N m)."""
     demanded = steer(units, wanted, params)
     gimbals = each(_servo, (units, state.rate, demanded.rate), params.bandwidth)
     return gimbals, each(clip, (demanded.torque, available(demanded.torque, state.momentum, params.rotors)))
@@ -304,7 +304,7 @@ def _servo(one: Turned, rate: Scalar, demanded: Scalar, bandwidth: Scalar) -> Sc
 
 
 def applied(state: State, command: Vector, body: Any, params: Prepared) -> Vector:
-    """The torque that gimbals and motors give the body (N m), without the terms in its angular acceleration."""
+    """Return the torque of gimbals and motors on the body (N m), without the terms in its angular acceleration."""
     units = turned(state, body.rate, params)
     torque = ZERO
     for one, rate, gimbal, rotor in zip(units, state.rate, *motors(state, units, command, params), strict=True):
@@ -314,13 +314,13 @@ def applied(state: State, command: Vector, body: Any, params: Prepared) -> Vecto
 
 
 def reaction(state: State, command: Vector, body: Any, params: Prepared) -> Vector:
-    """The torque of the units on the body (N m)."""
+    """Return the torque of the units on the body (N m)."""
     carried = add(momentum(state, params), apply(inertia_change(state, params), body.rate))
     return subtract(applied(state, command, body, params), cross(body.rate, carried))
 
 
 def inertia(state: State, params: Prepared) -> Matrix:
-    """The inertia that the body's angular acceleration meets besides the body's own (kg m2): rotors and gimbals turn on
+    """Return the inertia (kg m2) to add to the body's own in its angular acceleration: rotors and gimbals keep turning
     about their own axes."""
     total = inertia_change(state, params)
     for one in turned(state, ZERO, params):
@@ -331,7 +331,7 @@ def inertia(state: State, params: Prepared) -> Matrix:
 
 
 def inertia_change(state: State, params: Prepared) -> Matrix:
-    """The inertia of the whole less that with all gimbals at angle zero (kg m2)."""
+    """Return the inertia of the whole minus that with all gimbals at angle zero (kg m2)."""
     total: Matrix = (ZERO, ZERO, ZERO)
     for one in turned(state, ZERO, params):
         more = combine(1.0, _gram((one.spin,)), -1.0, _gram((one.unit.spin,)))
@@ -340,7 +340,7 @@ def inertia_change(state: State, params: Prepared) -> Matrix:
 
 
 def rates(state: State, command: Vector, body: Any, acceleration: Vector, params: Prepared) -> State:
-    """d(angles, rates, momenta)/dt."""
+    """Return d(angles, rates, momenta)/dt."""
     units = turned(state, body.rate, params)
     columns = (units, state.rate, *motors(state, units, command, params))
     return State(state.rate, each(_speeding, columns, acceleration), each(_spinning, columns, acceleration))
@@ -355,7 +355,7 @@ def _spinning(one: Turned, rate: Scalar, gimbal: Scalar, rotor: Scalar, accelera
 
 
 def momentum(state: State, params: Prepared) -> Vector:
-    """The units' angular momentum relative to the body (N m s)."""
+    """Return the units' angular momentum relative to the body (N m s)."""
     total = ZERO
     for one, rate, stored in zip(turned(state, ZERO, params), state.rate, state.momentum, strict=True):
         turning = scale(one.unit.about_gimbal * rate, one.unit.gimbal)
@@ -364,7 +364,7 @@ def momentum(state: State, params: Prepared) -> Vector:
 
 
 def record(state: State, command: Vector, body: Any, params: Prepared) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     units = turned(state, body.rate, params)
     gimbals, rotors = motors(state, units, command, params)
     demanded = steer(units, command, params)
@@ -372,12 +372,12 @@ def record(state: State, command: Vector, body: Any, params: Prepared) -> Sample
 
 
 def fastest(params: Params) -> float:
-    """The bandwidth (1/s) of the fastest gimbal servo."""
+    """Return the bandwidth (1/s) of the fastest gimbal servo."""
     return params.bandwidth
 
 
 def examples() -> list[Params]:
-    """Four variable-speed units in a pyramid, and four whose rotors nothing drives."""
+    """Return four variable-speed units in a pyramid, and four with undriven rotors."""
     flat, up = math.sqrt(2.0 / 3.0), math.sqrt(1.0 / 3.0)
     around = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
     unit = (8e-4, 1e-3, 6e-4, 8e-4, 1.0, 0.2)

@@ -1,4 +1,4 @@
-"""The torque that reaction wheels can give together: the facets of its envelope, and the largest box and ball within it."""
+"""The torque envelope of reaction wheels: its facets, and the largest box and ball within it."""
 
 from __future__ import annotations
 
@@ -23,16 +23,17 @@ WORST_CONDITION = 1e3
 
 
 def facets_of(axes: tuple[Vector, ...], least: tuple[Vector, ...]) -> Buffer:
-    """The facets that `allocate_peak` needs, of wheels with these axes and shares by least squares."""
+    """Return the facets that `allocate_peak` needs, for wheels with these axes and least-squares allocation rows."""
     return _facets(axes, _counted(least))
 
 
 def authority(wheels: Wheels, kind: Literal["axis", "norm"] = "norm", *, peak: bool = False) -> float:
-    """The torque (N m) that the wheels surely give: any torque of at most this norm ("norm"), or of at most this about each
-    body axis at once ("axis"), is allocated within the motors' torque limits. 0 where a wheel that is counted on has none.
+    """Return the torque (N m) available in every direction: any torque of at most this norm ("norm"), or of at most this
+    about each body axis at once ("axis"), is allocated within the motors' torque limits. It is 0 if a wheel in the
+    allocation has none.
 
-    Under least squares it is the largest such ball or box. With the least peak it is the largest within the envelope of
-    wheels that all have the least of the limits: the largest, where the limits are equal.
+    With least squares it is the largest such ball or box. With the least peak it is the largest in the envelope of wheels
+    that all have the least of the limits, which is exact if the limits are equal.
     """
     limits = [wheels.torque_limit[k] for k in _counted(wheels.least)]
     if peak:
@@ -43,15 +44,15 @@ def authority(wheels: Wheels, kind: Literal["axis", "norm"] = "norm", *, peak: b
 
 
 def _counted(least: tuple[Vector, ...]) -> tuple[int, ...]:
-    """The wheels that take part in the allocation."""
+    """Return the indices of the wheels that take part in the allocation."""
     return tuple(k for k, row in enumerate(least) if any(row))
 
 
 @cache
 def _facets(rows: tuple[Vector, ...], counted: tuple[int, ...]) -> Buffer:
-    """The pieces of `allocate_peak`, see `Wheels.facets`. Parallel wheels act as one of several times the strength; the
-    pairs of axes that lie in one plane share a facet, within which the same problem is solved once more with the plane's
-    axes alone. The last piece is repeated up to one for each pair of wheels."""
+    """Return the pieces of `allocate_peak`, see `Wheels.facets`. Parallel wheels act as one stronger wheel; pairs of axes
+    in one plane share a facet, in which the same problem is solved again with the axes in that plane. The last piece is
+    repeated until there is one for each pair of wheels."""
     axes = np.array(rows)
     spread = _merge_parallel(axes, counted)
     strong = spread.T @ axes
@@ -73,7 +74,7 @@ def _facets(rows: tuple[Vector, ...], counted: tuple[int, ...]) -> Buffer:
         normal /= outside @ heights
         peak = np.outer(outside, normal)
         left = np.eye(3) - strong.T @ peak
-        # With two axes there is one such plane, and either axis gives it.
+        # Two axes have one such plane, which either axis gives.
         for free in plane if len(plane) > 2 else plane[:1]:
             across = np.cross(normal, unit[free])
             sides = np.where(np.isin(np.arange(count), plane), np.sign(strong @ across), 0.0)
@@ -89,7 +90,7 @@ def _facets(rows: tuple[Vector, ...], counted: tuple[int, ...]) -> Buffer:
 
 
 def _merge_parallel(axes: Array, counted: tuple[int, ...]) -> Array:
-    """Signs (wheels, classes): the torque of wheel k is that of its class of parallel wheels times the sign."""
+    """Return signs (wheels, classes): the torque of a wheel is that of its class of parallel wheels times the sign."""
     classes: list[Array] = []
     leaders: list[Array] = []
     for k in counted:
@@ -103,7 +104,7 @@ def _merge_parallel(axes: Array, counted: tuple[int, ...]) -> Array:
 
 
 def check_authority(axes: Array, who: str) -> None:
-    """ValueError unless the axes (working wheels, 3) span the space well."""
+    """Raise ValueError unless the axes (working wheels, 3) span space with an acceptable condition number."""
     if len(axes) == 0:
         raise ValueError(f"{who} no torque at all: none is left")
     directions, sizes, _ = np.linalg.svd(axes.T)

@@ -1,4 +1,4 @@
-"""Bending modes of appendages, as finite elements give them: small deflections beside a rigid hub."""
+"""Bending modes of appendages, as from finite elements: small deflections relative to a rigid hub."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """For each mode the stiffness f^2 (1/s2), the damper 2 damping f (1/s), the coupling and the deflection at the start."""
+    """For each mode: stiffness f^2 (1/s2), damper 2 damping f (1/s), coupling and initial deflection."""
 
     stiffness: tuple[Scalar, ...]
     damping: tuple[Scalar, ...]
@@ -58,14 +58,15 @@ class State(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """The quantities that are recorded of the modes."""
+    """The recorded quantities of the modes."""
 
     mode_deflection: Annotated[tuple[float, ...], Quantity("sqrt(kg) m", "modal deflection of each mode", "mode")]
     mode_rate: Annotated[tuple[float, ...], Quantity("sqrt(kg) m/s", "rate of that deflection", "mode")]
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers that equations take. ValueError for no mode, a frequency that is not positive or a negative damping."""
+    """Return the numbers that equations take. Raise ValueError for no mode, a frequency not above 0 or a damping below
+    0."""
     if not params.modes:
         raise ValueError("there is no mode")
     for number, (frequency, damping, *_) in enumerate(params.modes, 1):
@@ -76,7 +77,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def check(params: Numbers, craft: Craft) -> None:
-    """Raise ValueError where the modes carry more inertia than the craft has, so that its hub would have a negative one."""
+    """Raise ValueError if the modes have more inertia than the craft, so that the hub's would be negative."""
     rest = tensor(total_inertia(craft)) + np.array(inertia(remember(params), params))
     moments = np.linalg.eigvalsh(rest)
     if moments[0] <= 0.0:
@@ -85,7 +86,7 @@ def check(params: Numbers, craft: Craft) -> None:
 
 
 def remember(params: Numbers) -> State:
-    """The state at the start: the modes deflected, at rest."""
+    """Return the initial state: the modes deflected, at rest."""
     return State(params.deflection, (0.0,) * len(params.deflection))
 
 
@@ -94,17 +95,17 @@ def _spring(stiffness: Scalar, damping: Scalar, deflection: Scalar, rate: Scalar
 
 
 def springs(state: State, params: Numbers) -> tuple[Scalar, ...]:
-    """The forces of springs and dampers on the modes (sqrt(kg) m/s2), with the sign of the deflection."""
+    """Return the forces of springs and dampers on the modes (sqrt(kg) m/s2), with the sign of the deflection."""
     return each(_spring, (params.stiffness, params.damping, state.deflection, state.rate))
 
 
 def reaction(state: State, command: Any, body: Any, params: Numbers) -> Vector:
-    """The torque of the modes on the body (N m)."""
+    """Return the torque of the modes on the body (N m)."""
     return subtract(weighted(springs(state, params), params.coupling), cross(body.rate, momentum(state, params)))
 
 
 def inertia(state: State, params: Numbers) -> Matrix:
-    """The inertia that the body's angular acceleration meets besides the body's own (kg m2): -sum d d^T."""
+    """Return the inertia (kg m2) to add to the body's own in its angular acceleration, -sum d d^T."""
 
     def row(axis: int) -> Vector:
         return scale(-1.0, weighted(tuple(d[axis] for d in params.coupling), params.coupling))
@@ -113,28 +114,28 @@ def inertia(state: State, params: Numbers) -> Matrix:
 
 
 def rates(state: State, command: Any, body: Any, acceleration: Vector, params: Numbers) -> State:
-    """d(deflections, rates)/dt."""
+    """Return d(deflections, rates)/dt."""
     pairs = zip(springs(state, params), params.coupling, strict=True)
     return State(state.rate, tuple(-spring - dot(coupling, acceleration) for spring, coupling in pairs))
 
 
 def momentum(state: State, params: Numbers) -> Vector:
-    """The modes' angular momentum relative to the body (N m s)."""
+    """Return the modes' angular momentum relative to the body (N m s)."""
     return weighted(state.rate, params.coupling)
 
 
 def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.deflection, state.rate)
 
 
 def fastest(params: Params) -> float:
-    """The fastest rate (1/s) of a mode with the hub held fast."""
+    """Return the fastest rate (1/s) of a mode with the hub fixed."""
     return max((row[0] for row in params.modes), default=0.0)
 
 
 def examples() -> list[Params]:
-    """A bending and a twisting mode, and one without damping."""
+    """Return a bending and a torsion mode, and one without damping."""
     return [
         Params(((0.6, 0.005, 0.3, 0.0, 0.1, 0.0), (2.4, 0.005, 0.0, 0.2, 0.0, 0.01))),
         Params(((1.5, 0.0, 0.0, 0.5, 0.2, 0.05),)),

@@ -1,9 +1,9 @@
 """Rigid panels on hinges with springs and dampers, whose motion moves the centre of mass and changes the inertia.
 
-The body's axes are those of the hub, its inertia that of the whole with all panels at their rest. About the centre of mass
-of the whole, which shifts as panels swing, the angular momentum is H = (J + dJ(x)) w + sum A_i(x) x_i', with x_i the angles
-of the hinges. Panels feel each other through the acceleration of that centre, three numbers, which are solved for first: so
-the work grows with the number of panels and not with its cube."""
+The body axes are those of the hub; the inertia is that of the whole with all panels in their rest positions. About the
+centre of mass of the whole, which shifts as panels swing, the angular momentum is H = (J + dJ(x)) w + sum A_i(x) x_i', with
+x_i the angles of the hinges. Panels interact through the acceleration of that centre, three numbers, which are solved for
+first, so the work grows with the number of panels and not with its cube."""
 
 from __future__ import annotations
 
@@ -75,9 +75,9 @@ class Params(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """A panel as equations take it: mass, the point of its hinge next to its centre of mass (m), the unit axes of the hinge,
-    to the centre and normal to both, the distance of the centre (m), moments about these axes (kg m2), the inverse of the
-    inertia about the hinge (1/(kg m2)), spring, damper, and the angle at the start."""
+    """A panel in the form that equations take: mass, the point on its hinge nearest its centre of mass (m), unit vectors
+    along the hinge, towards the centre and normal to both, the distance of the centre (m), moments about these axes (kg
+    m2), the inverse of the inertia about the hinge (1/(kg m2)), spring, damper, and initial angle."""
 
     mass: Scalar
     hinge: Vector
@@ -93,7 +93,7 @@ class Panel(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The panels, the mass of the whole (kg) and its inverse, and the inertia that the panels have at their rest (kg m2)."""
+    """The panels, the mass of the whole (kg) and its inverse, and the panels' inertia in their rest positions (kg m2)."""
 
     panels: tuple[Panel, ...]
     mass: Scalar
@@ -109,15 +109,15 @@ class State(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """The quantities that are recorded of the panels."""
+    """The recorded quantities of the panels."""
 
     panel_angle: Annotated[tuple[float, ...], Quantity("rad", "angle of each panel about its hinge", "panel")]
     panel_rate: Annotated[tuple[float, ...], Quantity("rad/s", "rate of that angle", "panel")]
 
 
 class _Swung(NamedTuple):
-    """A panel at its angle has a rate, its axes to the centre and normal, its centre of mass from the craft's present
-    one (m), its momentum for a unit of rate (kg m), and its angular momentum about the craft's centre (kg m2)."""
+    """A panel at its angle: its rate, its axes towards the centre and normal, its centre of mass relative to that of the
+    craft (m), and per unit of rate its momentum (kg m) and its angular momentum about the craft's centre (kg m2)."""
 
     panel: Panel
     angle: Scalar
@@ -130,7 +130,7 @@ class _Swung(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers that equations take. ValueError for panels that no craft can have."""
+    """Return the numbers that equations take. Raise ValueError for impossible panels."""
     panels = tuple(_panel(k, row) for k, row in enumerate(params.panels, 1))
     if not panels:
         raise ValueError("there is no panel")
@@ -141,7 +141,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def check(params: Numbers, craft: Craft) -> None:
-    """Raise ValueError where a craft without these panels is no rigid body: its hub would have a negative inertia."""
+    """Raise ValueError if the hub, the craft without these panels, would have a negative inertia."""
     masses = np.array([panel.mass for panel in params.panels])
     places = np.array([np.array(panel.hinge) + panel.length * np.array(panel.out) for panel in params.panels])
     hub = params.mass - masses.sum()
@@ -181,12 +181,12 @@ def _panel(number: int, row: tuple[float, ...]) -> Panel:
 
 
 def remember(params: Numbers) -> State:
-    """The state at the start: panels at rest at their angles."""
+    """Return the initial state: panels at rest at their angles."""
     return State(tuple(panel.angle for panel in params.panels), (0.0,) * len(params.panels))
 
 
 def _swung(state: State, params: Numbers) -> tuple[list[_Swung], Vector]:
-    """The panels at their angles, and the shift of the craft's centre of mass (m)."""
+    """Return the panels at their angles, and the shift of the craft's centre of mass (m)."""
     shift: Vector = ZERO
     placed: list[tuple[Vector, Vector, Vector]] = []
     for panel, angle in zip(params.panels, state.angle, strict=True):
@@ -204,7 +204,7 @@ def _swung(state: State, params: Numbers) -> tuple[list[_Swung], Vector]:
 
 
 def _whole(swung: list[_Swung], shift: Vector, params: Numbers) -> Matrix:
-    """The panels' share of the inertia about the craft's present centre of mass (kg m2), but for a constant."""
+    """Return the panels' contribution to the inertia about the craft's present centre of mass (kg m2), up to a constant."""
     total = _point(-params.mass, shift)
     for one in swung:
         axes = (one.panel.axis, one.out, one.normal)
@@ -215,19 +215,19 @@ def _whole(swung: list[_Swung], shift: Vector, params: Numbers) -> Matrix:
 
 
 def _outer(c: Scalar, a: Vector, b: Vector) -> Matrix:
-    """c a b^T."""
+    """Return c a b^T."""
     x, y, z = scale(c, a)
     return (scale(x, b), scale(y, b), scale(z, b))
 
 
 def _point(mass: Scalar, place: Vector) -> Matrix:
-    """The inertia of a point of mass (kg m2)."""
+    """Return the inertia of a point mass (kg m2)."""
     square = dot(place, place)
     return combine(mass, diagonal((square, square, square)), -mass, _outer(1.0, place, place))
 
 
 def _moving(swung: list[_Swung], params: Numbers) -> Vector:
-    """The velocity of the centre of mass due to the panels (m/s)."""
+    """Return the velocity of the centre of mass due to the panels (m/s)."""
     total = ZERO
     for one in swung:
         total = add(total, scale(one.rate * params.inverse, one.pushed))
@@ -235,7 +235,7 @@ def _moving(swung: list[_Swung], params: Numbers) -> Vector:
 
 
 def _moments(swung: list[_Swung], rate: Vector, params: Numbers) -> list[Scalar]:
-    """The moments about the hinges (N m) of springs, dampers and rates."""
+    """Return the moments about the hinges (N m) due to springs, dampers and rates."""
     moving, pulled = _moving(swung, params), ZERO
     for one in swung:
         pulled = add(pulled, scale(one.panel.mass * one.panel.length * params.inverse * one.rate * one.rate, one.out))
@@ -250,7 +250,7 @@ def _moments(swung: list[_Swung], rate: Vector, params: Numbers) -> list[Scalar]
 
 
 def _shared(swung: list[_Swung], params: Numbers) -> Matrix:
-    """The inverse of the hinges' coupling through the centre of mass: 1 - sum p p^T / (mass D)."""
+    """Return the inverse of the hinges' coupling through the centre of mass, 1 - sum p p^T / (mass D)."""
     coupling: Matrix = diagonal((1.0, 1.0, 1.0))
     for one in swung:
         coupling = combine(1.0, coupling, -1.0, _outer(params.inverse * one.panel.inverse, one.pushed, one.pushed))
@@ -258,7 +258,7 @@ def _shared(swung: list[_Swung], params: Numbers) -> Matrix:
 
 
 def _accelerations(swung: list[_Swung], moments: list[Scalar], params: Numbers) -> list[Scalar]:
-    """The hinges' accelerations (rad/s2) under these moments (N m), each sharing in the acceleration of the centre."""
+    """Return the hinges' accelerations (rad/s2) under these moments (N m), coupled by the acceleration of the centre."""
     pushing = ZERO
     for one, moment in zip(swung, moments, strict=True):
         pushing = add(pushing, scale(moment * one.panel.inverse, one.pushed))
@@ -268,11 +268,11 @@ def _accelerations(swung: list[_Swung], moments: list[Scalar], params: Numbers) 
 
 
 def reaction(state: State, command: Any, body: Any, params: Numbers) -> Vector:
-    """The torque of the panels on the body (N m)."""
+    """Return the torque of the panels on the body (N m)."""
     swung, shift = _swung(state, params)
     w, moving = body.rate, _moving(swung, params)
     carried = add(apply(inertia_change(state, params), w), momentum(state, params))
-    # The rate of change of the inertia, times w, and that of the hinges' momentum.
+    # The rate of change of the inertia times w, and of the hinges' momentum.
     given = scale(-params.mass, _swept(shift, moving, w))
     for one, speeding in zip(swung, _accelerations(swung, _moments(swung, w, params), params), strict=True):
         panel = one.panel
@@ -290,13 +290,13 @@ def _speed(one: _Swung) -> Vector:
 
 
 def _swept(place: Vector, speed: Vector, rate: Vector) -> Vector:
-    """The change of the inertia of a unit mass that moves, times a rate."""
+    """Return the rate of change of the inertia of a moving unit mass, times a rate."""
     twice = scale(2.0 * dot(place, speed), rate)
     return subtract(twice, add(scale(dot(place, rate), speed), scale(dot(speed, rate), place)))
 
 
 def inertia(state: State, params: Numbers) -> Matrix:
-    """The inertia that the body's angular acceleration meets besides the body's own (kg m2)."""
+    """Return the inertia (kg m2) to add to the body's own in its angular acceleration."""
     swung, _ = _swung(state, params)
     total, coupled = inertia_change(state, params), _NONE
     for one in swung:
@@ -308,12 +308,12 @@ def inertia(state: State, params: Numbers) -> Matrix:
 
 
 def inertia_change(state: State, params: Numbers) -> Matrix:
-    """The inertia of the whole less that with the panels in their rest positions (kg m2)."""
+    """Return the inertia of the whole minus that with the panels in their rest positions (kg m2)."""
     return combine(1.0, _whole(*_swung(state, params), params), -1.0, params.rest)
 
 
 def rates(state: State, command: Any, body: Any, acceleration: Vector, params: Numbers) -> State:
-    """d(angles, rates)/dt."""
+    """Return d(angles, rates)/dt."""
     swung, _ = _swung(state, params)
     moments = _moments(swung, body.rate, params)
     left = [moment - dot(one.turned, acceleration) for one, moment in zip(swung, moments, strict=True)]
@@ -321,7 +321,7 @@ def rates(state: State, command: Any, body: Any, acceleration: Vector, params: N
 
 
 def momentum(state: State, params: Numbers) -> Vector:
-    """The panels' angular momentum relative to the body (N m s)."""
+    """Return the panels' angular momentum relative to the body (N m s)."""
     total = ZERO
     for one in _swung(state, params)[0]:
         total = add(total, scale(one.rate, one.turned))
@@ -329,13 +329,13 @@ def momentum(state: State, params: Numbers) -> Vector:
 
 
 def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.angle, state.rate)
 
 
 def fastest(params: Params) -> float:
-    """The fastest rate (1/s) at which a panel swings, or its damper brings it to rest, on a hub that moves freely but
-    does not turn."""
+    """Return the fastest rate (1/s) at which a panel swings, or its damper stops it, on a hub that moves freely but does
+    not turn."""
     largest = 0.0
     for panel in prepare(params, 1.0).panels:
         swung = 1.0 / panel.inverse - (panel.mass * panel.length) ** 2 / params.mass
@@ -344,7 +344,7 @@ def fastest(params: Params) -> float:
 
 
 def examples() -> list[Params]:
-    """Two wings with different hinges, one of them deflected, and one panel that is free to swing."""
+    """Return two wings with different hinges, one of them deflected, and one panel that swings freely."""
     wing = (0.4, 0.5, 0.1, 0.0, 0.0, 1.0, 0.1, 0.6, 0.1, 0.0, 0.01, 0.005, 0.015, 0.2, 0.01)
     other = (0.3, -0.5, 0.0, 0.1, 0.1, 1.0, 0.0, -0.7, 0.0, 0.05, 0.012, 0.005, 0.016, 0.3, 0.0)
     return [Params(30.0, ((*wing, 0.15), (*other, 0.0))), Params(30.0, ((*wing[:-2], 0.0, 0.0, -0.1),))]

@@ -1,4 +1,4 @@
-"""Magnetorquers take momentum out of the wheels, under any law."""
+"""Magnetorquers unload the momentum of the wheels, under any law."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The gain (1/s), the largest dipoles (A m2), how they are limited, the momentum that stays (N m s), the
-    field, and the turn of their mounting, () for none."""
+    """The gain (1/s), the largest dipoles (A m2), how they are limited, the momentum to keep (N m s), the field, and the
+    rotation of their mounting, () for none."""
 
     gain: Scalar
     dipole_limit: Vector
@@ -56,20 +56,20 @@ class Numbers(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """The quantities that are recorded of the unloading."""
+    """The recorded quantities of the unloading."""
 
     unloading_dipole: Annotated[Vector, Quantity("A m^2", "dipole that unloads the wheels, body axes", "axis")]
     unloading_torque: Annotated[Vector, Quantity("N m", "torque that unloads the wheels, body axes", "axis")]
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
     mounted = as_built.turn_of(params.mounting_error)
     return Numbers(*params[:4], magnetic_field.prepared(params.epoch, period), mounted)
 
 
 def switch(state: State, wanted: Vector, measurement: Any, body: Any, params: Numbers, step: int) -> State:
-    """The dipole for the wheels' momentum in the measured field, and the field at the craft."""
+    """Return the dipole for the wheels' momentum in the measured field, and the field at the craft."""
     torque = scale(-params.gain, subtract(measurement.wheel_momentum, params.momentum))
     dipole = within(dipole_for(torque, measurement.magnetic_field), params.dipole_limit, params.limited)
     return State(as_built.in_body(params.mounted, dipole), magnetic_field.field_at(body.position, step, params.field))
@@ -84,16 +84,16 @@ remember, reaction, rates, momentum = (
 
 
 def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.dipole, reaction(state, command, body, params))
 
 
 def bound(params: Params, envelope: Envelope) -> Push:
-    """The largest norm of the torque: that of all dipoles in the strongest field of the orbit, or what the momentum asks
-    for, if that is less.
+    """Return a bound on the norm of the torque: that of all dipoles in the strongest field of the orbit, or the torque
+    demanded by the momentum, if that is less.
 
-    The limits make no dipole longer: |m| <= gain |h - momentum| / |B_m|, so that |m x B| <= |m| |B_m| + |m| |B - B_m| is at
-    most gain |h - momentum| and what the dipoles make of the field's error. h is the total less the body's momentum.
+    The limits make no dipole longer: |m| <= gain |h - momentum| / |B_m|, so |m x B| <= |m| |B_m| + |m| |B - B_m| is at most
+    gain |h - momentum| plus the torque of the dipoles in the field's error. h is the total minus the body's momentum.
     """
     limit = norm(params.dipole_limit)
     full = limit * magnetic_field.strongest(params.epoch, envelope.distance)
@@ -104,6 +104,6 @@ def bound(params: Params, envelope: Envelope) -> Push:
 
 
 def examples() -> list[Params]:
-    """Slow unloading by a CubeSat's magnetorquers, and a quick one, askew, that leaves a bias."""
+    """Return slow unloading by a CubeSat's magnetorquers, and fast unloading, misaligned, that leaves a bias."""
     askew = Params(0.02, (30.0, 30.0, 20.0), 1, (0.0, 0.01, 0.0), mounting_error=(0.0, 0.01, 0.02))
     return [Params(1e-3, (0.2, 0.2, 0.2)), askew]

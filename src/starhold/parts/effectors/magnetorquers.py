@@ -34,7 +34,7 @@ READS = ("magnetic_field",)
 LIMIT = Parameter("A m^2", above=0.0, shape=(3,), text="largest dipole along each body axis")
 LIMITED = Parameter(
     choices=("together", "each"),
-    text="dipoles beyond the limit are reduced together, which keeps the torque's direction, or each by itself",
+    text="dipoles beyond the limit are scaled down together, which keeps the torque's direction, or each is clipped",
 )
 """The declaration of the dipole limit, common to all parts with magnetorquers."""
 
@@ -49,7 +49,7 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The largest dipoles (A m2), how they are limited, the field, and the turn of their mounting, () for none."""
+    """The largest dipoles (A m2), how they are limited, the field, and the rotation of their mounting, () for none."""
 
     dipole_limit: Vector
     limited: int
@@ -58,51 +58,51 @@ class Numbers(NamedTuple):
 
 
 class State(NamedTuple):
-    """The dipole (A m2, body axes) and the field (T, inertial axes) of a control period."""
+    """The dipole (A m2, body axes) and the field (T, inertial axes) during a control period."""
 
     dipole: Vector
     field: Vector
 
 
 class Sample(NamedTuple):
-    """The quantities that are recorded of the magnetorquers."""
+    """The recorded quantities of the magnetorquers."""
 
     magnetic_dipole: Annotated[Vector, Quantity("A m^2", "dipole of the magnetorquers, body axes", "axis")]
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
     field, mounted = magnetic_field.prepared(params.epoch, period), as_built.turn_of(params.mounting_error)
     return Numbers(params.dipole_limit, params.limited, field, mounted)
 
 
 def remember(params: Any) -> State:
-    """The state at the start: switched off."""
+    """Return the initial state: switched off."""
     return State(ZERO, ZERO)
 
 
 def switch(state: State, wanted: Vector, measurement: Any, body: Any, params: Numbers, step: int) -> State:
-    """The dipole for a wanted torque (N m) in the measured field, and the field at the craft."""
+    """Return the dipole for a wanted torque (N m) in the measured field, and the field at the craft."""
     dipole = within(dipole_for(wanted, measurement.magnetic_field), params.dipole_limit, params.limited)
     return State(as_built.in_body(params.mounted, dipole), magnetic_field.field_at(body.position, step, params.field))
 
 
 def dipole_for(torque: Vector, field: Vector) -> Vector:
-    """The least dipole (A m2) that in a field (T) gives a torque (N m), but for its part along the field; zero without
-    a field."""
+    """Return the least dipole (A m2) whose torque in a field (T) is the component of a torque (N m) across the field; zero
+    without a field."""
     square = dot(field, field)
     return scale(where(less(0.0, square), divide(1.0, square), 0.0), cross(field, torque))
 
 
 def within(dipole: Vector, limit: Vector, limited: int) -> Vector:
-    """A dipole (A m2) within the limit of each axis, reduced together or each on its own."""
+    """Return a dipole (A m2) within the limit of each axis, scaled down as a whole or clipped per axis."""
 
     def reduced(*dipole: Scalar) -> Vector:
         x, y, z = each(_filled, (dipole, limit))
         return scale(1.0 / maximum(maximum(maximum(x, y), z), 1.0), cast(Vector, dipole))
 
     if not limited:
-        # Most dipoles are within their limits, and stay as they are.
+        # Most dipoles are within their limits, and do not change.
         exceeds = reduce(either, each(_exceeds, (dipole, limit)))
         dipole = cast(Vector, when(exceeds, reduced, *dipole))
     cut: Any = each(clip, (dipole, limit))
@@ -118,31 +118,31 @@ def _filled(dipole: Scalar, limit: Scalar) -> Scalar:
 
 
 def reaction(state: State, command: Any, body: Any, params: Any) -> Vector:
-    """The torque on the body (N m)."""
+    """Return the torque on the body (N m)."""
     return cross(state.dipole, to_body(body.attitude, state.field))
 
 
 def rates(state: State, command: Any, body: Any, acceleration: Vector, params: Any) -> Any:
-    """Nothing changes between control instants."""
+    """Return no rates: nothing changes between control instants."""
     return None
 
 
 def momentum(state: State, params: Any) -> Vector:
-    """No momentum (N m s)."""
+    """Return zero momentum (N m s)."""
     return ZERO
 
 
 def applied(state: State, command: Any, body: Any, params: Numbers) -> Vector:
-    """The torque on the body (N m)."""
+    """Return the torque on the body (N m)."""
     return reaction(state, command, body, params)
 
 
 def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.dipole)
 
 
 def examples() -> list[Params]:
-    """Those of a CubeSat, and larger ones, askew, at another time."""
+    """Return those of a CubeSat, and larger, misaligned ones at another time."""
     large = Params((30.0, 30.0, 20.0), 1, (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), (0.01, -0.02, 0.0))
     return [Params((0.2, 0.2, 0.2)), large]

@@ -1,5 +1,4 @@
-"""Pairs of thrusters about each body axis, one for each sense, are on or off: pulses of modulated width behind a
-Schmitt trigger."""
+"""On-off thrusters in pairs about each body axis, one for each sense: pulse-width modulation behind a Schmitt trigger."""
 
 from __future__ import annotations
 
@@ -29,16 +28,16 @@ CARD = Card(
 ROLE = "effector"
 ACTS = OUTSIDE = True
 KNOWN = ("torque",)
-"""The width of a pulse is computed with it."""
+"""Pulse widths are computed from it."""
 GRAVITY = 9.80665
 """Standard gravity (m/s2), by which a specific impulse is given in seconds."""
 Row: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 OFF = 1e-6
-"""Share of its torque by which a layout may differ from `torque`."""
+"""Relative difference allowed between the torque of a layout and `torque`."""
 
 
 class Params(NamedTuple):
-    """The torque of a pair, when it fires, its propellant, and where its thrusters are."""
+    """The torque of a pair, its firing thresholds, its propellant, and the layout of its thrusters."""
 
     torque: Annotated[Vector, Parameter("N m", above=0.0, shape=(3,), text="of a pair about each body axis that fires")]
     minimum: Annotated[float, Parameter("s", at_least=0.0, text="shortest time that a pair is on")] = 0.0
@@ -50,7 +49,7 @@ class Params(NamedTuple):
     )
     pulses: Annotated[
         int,
-        Parameter(choices=("modulated", "whole"), text="as long as the command asks for, or as long as a control period"),
+        Parameter(choices=("modulated", "whole"), text="as long as commanded, or a whole control period"),
     ] = 0
     lever: Annotated[float, Parameter("m", above=0.0, text="arm of a thruster about its axis")] = 1.0
     specific_impulse: Annotated[float, Parameter("s", above=0.0, text="of the propellant")] = 220.0
@@ -69,9 +68,9 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The parameters, the control period (s), the propellant for an impulse of torque (kg/(N m s)), the turn of their
-    mounting, () for none, and by how much each axis pushes the body in the positive and in the negative sense (m/s2, along
-    the mounting), () where the orbit is not moved."""
+    """The parameters, the control period (s), the propellant per impulse of torque (kg/(N m s)), the rotation of their
+    mounting, () for none, and the acceleration of the body by each axis in the positive and in the negative sense (m/s2,
+    along the mounting), () if the orbit is not moved."""
 
     torque: Vector
     minimum: Scalar
@@ -85,8 +84,8 @@ class Numbers(NamedTuple):
 
 
 class State(NamedTuple):
-    """For each axis the sense in which its thrusters fire (-1, 0, 1), the time left (s), and the impulse of their
-    torque since the start, in either sense (N m s)."""
+    """For each axis: the sense in which its thrusters fire (-1, 0, 1), the time left (s), and the total impulse of their
+    torque since the start, both senses added (N m s)."""
 
     firing: Vector
     left: Vector
@@ -94,7 +93,7 @@ class State(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """The quantities that are recorded of the thrusters."""
+    """The recorded quantities of the thrusters."""
 
     thruster_time: Annotated[Vector, Quantity("s", "time on in each control period, signed", "axis")]
     thruster_impulse: Annotated[Vector, Quantity("N m s", "impulse of the thrusters' torque, either way", "axis")]
@@ -102,8 +101,8 @@ class Sample(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control period (s). ValueError where thresholds, the shortest pulse or the layout do not fit, and for
-    a force without a mass."""
+    """Return the numbers that equations take, for a control period (s). Raise ValueError if thresholds, the shortest pulse
+    or the layout do not fit, and for a force without a mass."""
     if any(off > on for off, on in zip(params.off, params.on, strict=True)):
         raise ValueError("a pair cannot stop firing at a command above that at which it starts: off must be at most on")
     if params.minimum > period:
@@ -118,7 +117,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def _forces(layout: tuple[Row, ...], torque: Vector) -> tuple[tuple[Vector, ...], ...]:
-    """The net force (N) of the thrusters for each axis in the positive and in the negative sense, () without a layout."""
+    """Return the net force (N) of the thrusters for each axis in positive and negative sense, () without a layout."""
     forces, torques = ([[ZERO] * 3, [ZERO] * 3] for _ in range(2))
     for axis, sense, *numbers in layout:
         if axis not in (1.0, 2.0, 3.0) or sense not in (1.0, -1.0):
@@ -136,12 +135,12 @@ def _forces(layout: tuple[Row, ...], torque: Vector) -> tuple[tuple[Vector, ...]
 
 
 def remember(params: Numbers) -> State:
-    """The state at the start: nothing fires."""
+    """Return the initial state: nothing fires."""
     return State(ZERO, ZERO, ZERO)
 
 
 def switch(state: State, wanted: Vector, measurement: Any, body: Any, params: Numbers, step: int) -> State:
-    """The pairs that fire in the control step that begins, and for how long, for a wanted torque (N m)."""
+    """Return the state with the pairs that fire in this control step, and for how long, for a wanted torque (N m)."""
     firing: Any = each(_trigger, (wanted, state.firing, params.on, params.off))
     left: Any = each(_width, (wanted, firing, params.torque), params)
     return State(firing, left, state.impulse)
@@ -159,7 +158,7 @@ def _width(wanted: Scalar, firing: Scalar, torque: Scalar, params: Numbers) -> S
 
 
 def pulse(state: State, substep: Scalar, params: Numbers) -> Vector:
-    """The share of a substep that each pair is on, with its sense."""
+    """Return the share of a substep for which each pair is on, with its sense."""
     share: Any = each(_share, (state.firing, state.left), substep)
     return share
 
@@ -169,12 +168,12 @@ def _share(firing: Scalar, left: Scalar, substep: Scalar) -> Scalar:
 
 
 def reaction(state: State, command: Vector, body: Any, params: Numbers) -> Vector:
-    """The torque on the body (N m)."""
+    """Return the torque on the body (N m)."""
     return as_built.in_body(params.mounted, times(params.torque, command))
 
 
 def push(state: State, command: Vector, body: Any, params: Numbers) -> Vector | None:
-    """Acceleration of the centre of mass (inertial, m/s2), None where the orbit is not moved."""
+    """Return the acceleration of the centre of mass (inertial, m/s2), None if the orbit is not moved."""
     if not params.pushes:
         return None
     shares = (*each(maximum, (command, ZERO)), *(maximum(-share, 0.0) for share in command))
@@ -183,30 +182,30 @@ def push(state: State, command: Vector, body: Any, params: Numbers) -> Vector | 
 
 
 def rates(state: State, command: Vector, body: Any, acceleration: Vector, params: Numbers) -> Any:
-    """d(state)/dt: the time runs, the impulse grows."""
+    """Return d(state)/dt: the time left decreases, the impulse grows."""
     share: Any = each(absolute, (command,))
     return State(None, scale(-1.0, share), times(params.torque, share))  # pyright: ignore[reportArgumentType]
 
 
 def momentum(state: State, params: Numbers) -> Vector:
-    """No momentum (N m s)."""
+    """Return zero momentum (N m s)."""
     return ZERO
 
 
 def applied(state: State, command: Vector, body: Any, params: Numbers) -> Vector:
-    """The mean torque of the control period that begins (N m)."""
+    """Return the mean torque of the control period that begins (N m)."""
     given = scale(1.0 / params.period, times(params.torque, times(state.firing, state.left)))
     return as_built.in_body(params.mounted, given)
 
 
 def record(state: State, command: Vector, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     x, y, z = state.impulse
     return Sample(times(state.firing, state.left), state.impulse, params.propellant * (x + y + z))
 
 
 def examples() -> list[Params]:
-    """A pair of 20 mN m with a trigger, one, askew, that fires for whole control periods, and single thrusters."""
+    """Return pairs of 20 mN m with a trigger, misaligned ones that fire for whole control periods, and single thrusters."""
     single = (
         (1.0, (0.0, 0.2, 0.0), (0.0, 0.0, 0.1)),
         (2.0, (0.0, 0.0, 0.2), (0.1, 0.0, 0.0)),

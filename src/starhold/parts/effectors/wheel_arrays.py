@@ -1,4 +1,4 @@
-"""Matrices of reaction wheels, with NumPy: of one craft or, with lanes first, of many, with the same bits."""
+"""Matrices of reaction wheels with NumPy, for one craft or for many (lanes first), with the same bits."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ MOST = 24
 
 
 def unit_axes(axes: Array) -> Array:
-    """The axes (..., N, 3) with length one."""
+    """Return the axes (..., N, 3) scaled to unit length."""
     return axes / np.linalg.norm(axes, axis=-1)[..., None]
 
 
 def least_squares(axes: Array, working: Sequence[int]) -> Array:
-    """The allocation (..., N, 3) with the least sum of squares among the working wheels; zero for the others."""
+    """Return the allocation (..., N, 3) of least squares over the working wheels; zero for the others."""
     rows = np.zeros_like(axes)
     rows[..., working, :] = -np.linalg.pinv(np.take(axes, working, axis=-2).swapaxes(-1, -2))
     return rows
 
 
 def axial(axes: Array, inertia: Array) -> Array:
-    """The inertia (..., 3, 3; kg m2) of rotors (..., N) about their own axes (..., N, 3)."""
+    """Return the inertia (..., 3, 3; kg m2) of rotors (..., N) about their own axes (..., N, 3)."""
     return (axes.swapaxes(-1, -2) * inertia[..., None, :]) @ axes
 
 
 def most_of_each(rows: Array, kind: str) -> Array:
-    """The most (..., N) that each row (..., N, 3) gives of a vector within the unit ball, or the unit box ("axis")."""
+    """Return the maximum (..., N) of each row (..., N, 3) times a vector in the unit ball, or in the unit box ("axis")."""
     return np.linalg.norm(rows, axis=-1, ord=1 if kind == "axis" else 2)
 
 
 def checked_axes(axes: Sequence[Sequence[float]]) -> Array:
-    """The unit axes (N, 3) of wheels. ValueError where they are none, or too many."""
+    """Return the unit axes (N, 3) of wheels. Raise ValueError for axes without direction, or too many."""
     matrix = np.asarray(axes, dtype=float)
     if matrix.ndim != 2 or matrix.shape[1] != 3:
         raise ValueError(f"wheel axes must be vectors of three numbers, not an array of shape {matrix.shape}")
@@ -51,8 +51,8 @@ def checked_axes(axes: Sequence[Sequence[float]]) -> Array:
 
 
 def checked_column(name: str, value: Any, count: int, least: float | None, infinite: bool = False) -> tuple[float, ...]:
-    """A number for each wheel, from one for each or one for all; `least` None asks for positive ones. ValueError where one
-    is out of range."""
+    """Return a number for each wheel, from one for each or one for all; `least` None requires positive numbers. Raise Raise
+    ValueError if one is out of range."""
     given = np.asarray(value, dtype=float)
     if given.shape not in ((), (count,)):
         raise ValueError(f"{name}: one number or {count} are needed, not an array of shape {given.shape}")

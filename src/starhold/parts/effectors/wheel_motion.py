@@ -1,9 +1,9 @@
-"""Real wheels have stiction, motors of limited power, and rotors out of balance.
+"""Imperfections of wheels: stiction, limited motor power, and imbalance.
 
-Friction that is largest as a rotor begins to turn is Stribeck's, sqrt(e) (static - coulomb) (W/s) exp(-(W/s)^2/2) beside the
-others, W the speed and s that at which it is largest. A rotor out of balance turns a torque about the craft with it,
-W^2 times the product of inertia (dynamic), or times the mass moment at the arm of its place (static): it shakes the craft at
-the wheel's own frequency. What the force of a static imbalance does to the orbit is left out.
+Stiction is Stribeck's friction, sqrt(e) (static - coulomb) (W/s) exp(-(W/s)^2/2) in addition to the other kinds, with W the
+speed and s the speed at which it is largest. An unbalanced rotor exerts a torque that turns with it, W^2 times the product
+of inertia (dynamic), or times the mass moment and its lever arm (static): it shakes the craft at the wheel's frequency. The
+effect of the static imbalance's force on the orbit is neglected.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ def with_more(
     dynamic_imbalance: Sequence[float],
     position: Sequence[Vector],
 ) -> Wheels:
-    """The wheels with static friction (N m), 0 for none besides Coulomb's, its speed (rad/s), power limits (W), and rotors
-    with mass moments (kg m) and products of inertia (kg m2) at places from the centre of mass (m, body axes).
+    """Return the wheels with static friction (N m), 0 for none besides Coulomb's, its speed (rad/s), power limits (W), and
+    rotors with mass moments (kg m) and products of inertia (kg m2) at positions from the centre of mass (m, body axes).
 
-    ValueError where static friction is less than Coulomb's or has no speed, and where a top speed is needed and absent."""
+    Raise ValueError if static friction is less than Coulomb's or has no speed, or if a top speed is needed but absent."""
     for i, (coulomb, most, speed) in enumerate(zip(wheels.coulomb, static, stribeck_speed, strict=True), 1):
         if most and not (most >= coulomb and speed > 0.0):
             raise ValueError(
@@ -67,8 +67,8 @@ def with_more(
 
 
 def mounted(wheels: Wheels, errors: Sequence[Vector]) -> Wheels:
-    """The wheels with each spin axis turned by a small angle about the body axes (rad), which laws and allocation do not
-    know."""
+    """Return the wheels with each spin axis turned by a small rotation vector (rad, body axes) that laws and allocation do
+    not know."""
     if not is_given(*errors):
         return wheels
     axes = tuple(in_body(turn_of(error), axis) for error, axis in zip(errors, wheels.axes, strict=True))
@@ -76,30 +76,30 @@ def mounted(wheels: Wheels, errors: Sequence[Vector]) -> Wheels:
 
 
 def as_known(wheels: Wheels) -> Wheels:
-    """The wheels, with the axes that laws and allocation assume."""
+    """Return the wheels with the axes that laws and allocation assume."""
     return wheels._replace(axes=wheels.known_axes, known_axes=()) if wheels.known_axes else wheels
 
 
 def _sides(axis: Vector) -> tuple[Vector, Vector]:
-    """Two unit vectors that make a right-handed triad with an axis."""
+    """Return two unit vectors that make a right-handed triad with an axis."""
     least = np.eye(3)[int(np.argmin(np.abs(axis)))]
     side = np.cross(axis, least) / np.linalg.norm(np.cross(axis, least))
     return vector(side), vector(np.cross(axis, side))
 
 
 def has_friction(wheels: Wheels) -> bool:
-    """Whether a bearing has friction of any kind."""
+    """Return whether a bearing has friction of any kind."""
     return any((*wheels.viscous, *wheels.coulomb, *wheels.sticking))
 
 
 def without_friction(wheels: Wheels) -> Wheels:
-    """The wheels on ideal bearings, and balanced."""
+    """Return the wheels on ideal bearings, and balanced."""
     none = (0.0,) * len(wheels.axes)
     return wheels._replace(viscous=none, coulomb=none, sticking=(), stribeck_speed=(), unbalanced=())
 
 
 def speeds(momentum: Numbers, rate: Vector, wheels: Wheels) -> Numbers:
-    """The speeds (rad/s) of the rotors relative to the body."""
+    """Return the speeds (rad/s) of the rotors relative to the body."""
     return each(_speed, (momentum, wheels.axes, wheels.inertia), rate)
 
 
@@ -108,7 +108,7 @@ def _speed(momentum: Scalar, axis: Vector, inertia: Scalar, rate: Vector) -> Sca
 
 
 def limited(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Wheels:
-    """The wheels with the torque limits that their power leaves for these commands: a motor that brakes needs none."""
+    """Return the wheels with torque limits reduced by their power limits for these commands; braking needs no power."""
     if not wheels.power_limit:
         return wheels
     columns = (command, speeds(momentum, rate, wheels), wheels.torque_limit, wheels.power_limit)
@@ -121,7 +121,7 @@ def _within(command: Scalar, speed: Scalar, limit: Scalar, power: Scalar) -> Sca
 
 
 def at_top_speed(wheels: Wheels) -> Wheels:
-    """The wheels with the torque limits that are left at their momentum limits."""
+    """Return the wheels with the torque limits available at their momentum limits."""
     if not wheels.power_limit:
         return wheels
     columns = zip(wheels.torque_limit, wheels.power_limit, top_speeds(wheels), strict=True)
@@ -129,17 +129,17 @@ def at_top_speed(wheels: Wheels) -> Wheels:
 
 
 def top_speeds(wheels: Wheels) -> Numbers:
-    """The speeds (rad/s) at the momentum limits."""
+    """Return the speeds (rad/s) at the momentum limits."""
     return tuple(limit / inertia for limit, inertia in zip(wheels.momentum_limit, wheels.inertia, strict=True))
 
 
 def sticking(momentum: Numbers, rate: Vector, wheels: Wheels) -> Numbers:
-    """Stribeck's friction on the rotors (N m), in addition to the other kinds."""
+    """Return Stribeck's friction on the rotors (N m), in addition to the other kinds."""
     return each(_stuck, (speeds(momentum, rate, wheels), wheels.sticking, wheels.stribeck_speed))
 
 
 def slopes(wheels: Wheels) -> Numbers:
-    """How steeply Stribeck's friction of each rotor begins (N m s)."""
+    """Return the slope of Stribeck's friction of each rotor at standstill (N m s)."""
     if not wheels.sticking:
         return (0.0,) * len(wheels.axes)
     return tuple(PEAK * most / over for most, over in zip(wheels.sticking, wheels.stribeck_speed, strict=True))
@@ -151,7 +151,7 @@ def _stuck(speed: Scalar, most: Scalar, over: Scalar) -> Scalar:
 
 
 def shaken(angle: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Vector:
-    """The torque of rotors out of balance on the body (N m), at angles in turns."""
+    """Return the torque of unbalanced rotors on the body (N m), at angles in turns."""
     torque: Any = ZERO
     for turn, speed, (first, second) in zip(angle, speeds(momentum, rate, wheels), wheels.unbalanced, strict=True):
         cosine, sine = cosine_sine(turn)

@@ -1,7 +1,7 @@
-"""Reaction wheels that can be bought, from CubeSats to large platforms, as their makers' public data sheets state them.
+"""Commercial reaction wheels, from CubeSats to large platforms, with numbers from their makers' public data sheets.
 
-The makers publish no friction, and most of them no top speed; where that is not given, the rotor inertia is not known.
-The masses of RW-0.003 and the RW4 wheels are the largest that their sheets allow.
+The makers publish no friction, and most no top speed; without a top speed the rotor inertia is not known. The masses of
+RW-0.003 and the RW4 wheels are upper limits from their data sheets.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class WheelUnit:
 
     @property
     def inertia(self) -> float | None:
-        """Rotor inertia about the spin axis (kg m2): momentum over top speed, None where the speed is not known."""
+        """Rotor inertia about the spin axis (kg m2): momentum over top speed, None if that is not known."""
         return None if self.top_speed is None else self.momentum_limit / self.top_speed
 
 
@@ -61,4 +61,4 @@ WHEEL_UNITS: dict[str, WheelUnit] = {
         WheelUnit("HR16-100", "Honeywell", 0.200, 100.0, _per_minute(6000.0), 12.0, _HONEYWELL_SHEET),
     )
 }
-"""By name, from the smallest momentum to the largest."""
+"""Wheels by name, in order of momentum."""

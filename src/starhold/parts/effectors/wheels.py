@@ -1,7 +1,7 @@
 """Reaction wheels: the allocation of a wanted torque, motors and friction, and the torque on the body.
 
-The state of a wheel is the absolute axial momentum h = inertia (W + a . rate) of its rotor (N m s): a is its unit axis
-in body axes, W its speed relative to the body. With the wheels' axial inertia taken out of the body's (`bare_inertia`),
+The state of a wheel is the absolute axial momentum h = inertia (W + a . rate) of its rotor (N m s): a is its unit axis in
+body axes, W its speed relative to the body. With the wheels' axial inertia subtracted from the body's (`bare_inertia`),
 
     J' w' = on_body + external - w x J' w,        h_i' = motor_i
 
@@ -55,10 +55,10 @@ Rows = tuple[Vector, ...]
 """A vector for each wheel: motor torque i is row i times the wanted body torque."""
 
 BAND = 0.01
-"""Over this last part of the momentum range the motor loses its outward torque, linearly to none at the limit."""
+"""Over this last share of the momentum range the motor's outward torque fades linearly to zero at the limit."""
 CREEP = 1.0
-"""Below this relative speed (rad/s) Coulomb friction grows in proportion to the speed: a friction that jumps with the sign
-would make any integrator of fixed step chatter about standstill."""
+"""Below this relative speed (rad/s) Coulomb friction is proportional to the speed: with a jump at standstill, any
+fixed-step integrator would chatter there."""
 
 ALLOCATIONS = ("least-squares", "least-peak")
 """The allocation rules."""
@@ -80,86 +80,86 @@ class Wheels(NamedTuple):
     """The allocation rule, an index into ALLOCATIONS."""
     facets: Buffer | tuple[()] = ()
     """The pieces of `allocate_peak`, of 6 + 3 N numbers each: a normal, an edge, and a row for each wheel. Torques in the
-    cone above a facet of the envelope cost the peak |normal . torque|, and pieces of one facet are told apart by the
-    largest |edge . torque|."""
+    cone above a facet of the envelope have the peak |normal . torque|, and among the pieces of one facet the largest |edge
+    . torque| decides."""
     sticking: Numbers = ()
-    """Static friction beyond Coulomb's (N m), its speeds (rad/s), power limits of the motors (W), and two torques (N m at
-    1 rad/s) that turn with each rotor; each () for none. See `wheel_motion`."""
+    """Static friction beyond Coulomb's (N m), its speeds (rad/s), power limits of the motors (W), and two torques (N m at 1
+    rad/s) that turn with each rotor; () for none. See `wheel_motion`."""
     stribeck_speed: Numbers = ()
     power_limit: Numbers = ()
     unbalanced: tuple[Rows, ...] = ()
     known_axes: Rows = ()
-    """The axes for which laws and allocation take wheels that are mounted askew; () for wheels that are not."""
+    """The axes that laws and allocation assume for misaligned wheels; () for aligned wheels."""
 
 
 Params = Wheels
 
 
 class State(NamedTuple):
-    """The absolute momentum of each rotor about its axis (N m s), and the angles (turns) of rotors out of balance."""
+    """The absolute momentum of each rotor about its axis (N m s), and the angles (turns) of unbalanced rotors."""
 
     momentum: Numbers
     angle: Numbers = ()
 
 
 class Sample(NamedTuple):
-    """The quantities that are recorded of the wheels."""
+    """The recorded quantities of the wheels."""
 
     wheel_momentum: Annotated[Numbers, Quantity("N m s", "angular momentum of each rotor about its spin axis", "wheel")]
     wheel_torque: Annotated[Numbers, Quantity("N m", "rate of that momentum: the motor's torque and friction", "wheel")]
-    wheel_command: Annotated[Numbers, Quantity("N m", "torque asked of each motor", "wheel")]
+    wheel_command: Annotated[Numbers, Quantity("N m", "commanded torque of each motor", "wheel")]
     wheel_available: Annotated[
-        Numbers, Quantity("N m", "most that the motor gives in that direction, as its momentum is", "wheel")
+        Numbers, Quantity("N m", "largest torque of the motor in that direction at its present momentum", "wheel")
     ]
 
 
 def prepare(params: Wheels, period: float) -> Wheels:
-    """The wheels, prepared for their allocation."""
+    """Return the wheels, prepared for their allocation."""
     return with_facets(params) if params.allocation else params
 
 
 def with_facets(wheels: Wheels) -> Wheels:
-    """The wheels with the facets that `allocate_peak` needs. Any wheels of this number have as many facets, so that one
-    kernel serves them before a loss and after."""
+    """Return the wheels with the facets that `allocate_peak` needs. Their number depends only on the number of wheels, so
+    one kernel serves before and after a loss."""
     return wheels._replace(facets=facets_of(as_known(wheels).axes, wheels.least))
 
 
 def remember(params: Wheels) -> State:
-    """Rotors at rest."""
+    """Return the initial state: rotors at rest."""
     return State((0.0,) * len(params.axes), (0.0,) * len(params.unbalanced))
 
 
 def command(applied: Vector, params: Wheels) -> Numbers:
-    """Motor torques (N m) for a wanted torque on the body (N m)."""
+    """Return the motor torques (N m) for a wanted torque on the body (N m)."""
     return allocate_peak(applied, params) if params.allocation else allocate(applied, params)
 
 
 def reaction(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
-    """The torque of the wheels on the body (N m)."""
+    """Return the torque of the wheels on the body (N m)."""
     h, rate = state.momentum, body.rate
     torque = on_body(motor(command, h, rate, params, _rubs(params)), h, rate, params)
     return add(torque, shaken(state.angle, h, rate, params)) if params.unbalanced else torque
 
 
 def rates(state: State, command: Numbers, body: Any, acceleration: Vector, params: Wheels) -> State:
-    """d(momentum)/dt of each rotor (N m), and its speed (turns/s) where it is out of balance."""
+    """Return d(momentum)/dt of each rotor (N m), and the speeds (turns/s) of unbalanced rotors."""
     turning = speeds(state.momentum, body.rate, params) if params.unbalanced else ()
     given = motor(command, state.momentum, body.rate, params, _rubs(params))
     return State(given, tuple(x * (0.5 / math.pi) for x in turning))
 
 
 def momentum(state: State, params: Wheels) -> Vector:
-    """The rotors' momentum in body axes (N m s)."""
+    """Return the rotors' momentum in body axes (N m s)."""
     return wheel_momentum(state.momentum, params)
 
 
 def measured_momentum(state: State, params: Wheels) -> Vector:
-    """This momentum as tachometers and the known axes tell it."""
+    """Return this momentum as measured by tachometers, with the assumed axes (N m s)."""
     return wheel_momentum(state.momentum, as_known(params))
 
 
 def record(state: State, command: Numbers, body: Any, params: Wheels) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     h = state.momentum
     return Sample(
         h, motor(command, h, body.rate, params), command, available(command, h, limited(command, h, body.rate, params))
@@ -167,13 +167,13 @@ def record(state: State, command: Numbers, body: Any, params: Wheels) -> Sample:
 
 
 def applied(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
-    """The torque of motors and friction on the body (N m)."""
+    """Return the torque of motors and friction on the body (N m)."""
     return scale(-1.0, weighted(motor(command, state.momentum, body.rate, params), params.axes))
 
 
 def error(params: Wheels, envelope: Envelope) -> Push:
-    """The largest torque of friction on rotors within their momentum limits, together or against one another, by which the
-    motors' falls short of the command; imbalance has no bound on a body that turns, wheels mounted askew state none."""
+    """Return a bound on the difference between the wheels' torque and the command due to friction, for rotors within their
+    momentum limits; unbalanced wheels on a turning body have no bound, and misaligned wheels state none."""
     if params.unbalanced or params.known_axes:
         return Push(math.inf)
     A, viscous = np.array(params.axes), np.array(params.viscous)
@@ -185,28 +185,28 @@ def error(params: Wheels, envelope: Envelope) -> Push:
 
 
 def fastest(params: Wheels) -> float:
-    """The fastest rate (1/s) at which friction brings a rotor to rest, that of Coulomb friction within CREEP included, or
-    the top speed of rotors out of balance."""
+    """Return the fastest rate (1/s) at which friction stops a rotor, including Coulomb friction within CREEP, or the top
+    speed of unbalanced rotors."""
     columns = zip(params.viscous, params.coulomb, params.inertia, slopes(params), strict=True)
     friction = max((viscous + coulomb / CREEP + slope) / inertia for viscous, coulomb, inertia, slope in columns)
     return max(friction, *top_speeds(params)) if params.unbalanced else friction
 
 
 def examples() -> list[Wheels]:
-    """Three wheels along the axes, with friction, and a pyramid of four."""
+    """Return three wheels along the axes, with friction, and a pyramid of four."""
     return [make_wheels(three_orthogonal(), 1e-3, 0.05, 0.4, 1e-5, 1e-4), make_wheels(pyramid(), 1e-3, 0.05, 0.4)]
 
 
 def allocate(torque: Vector, wheels: Wheels) -> Numbers:
-    """Motor torques (N m) that together give the body this torque (N m), -sum a_i tau_i = torque, with the least sum of
-    squares. Limits and friction are ignored; a lost wheel gets none."""
+    """Return the motor torques (N m) with the least sum of squares that give the body this torque (N m), -sum a_i tau_i =
+    torque. Limits and friction are ignored; a lost wheel gets zero."""
     return each(dot, (wheels.least,), torque)
 
 
 def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
-    """Motor torques (N m) that together give the body this torque (N m), the largest of them as small as can be; where
-    that leaves a choice, the next largest too. Continuous and piecewise linear in the torque. Limits and friction are
-    ignored; a lost wheel gets none. Not for exact polynomials, which cannot compare pieces with pieces.
+    """Return the motor torques (N m) that give the body this torque (N m) with the least peak, and among those with the
+    least next largest one. They are continuous and piecewise linear in the torque. Limits and friction are ignored; a lost
+    wheel gets zero. Not for exact polynomials, which cannot compare pieces with pieces.
 
     By duality the least peak is the largest |y . torque| with sum |y . a_k| = 1, and the largest is reached where y is
     normal to two of the axes: all other wheels give the peak, and the two follow from the torque (facets of a zonotope, the
@@ -223,7 +223,7 @@ def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
 
     def better(k: Any, *best: Scalar) -> tuple[Any, ...]:
         candidate = piece(k + 1)
-        # Where two facets cost the same, both give the same torques.
+        # Where two facets have the same peak, both give the same torques.
         inner = both(less_equal(best[0], candidate[0]), less(best[1], candidate[1]))
         wins = either(less(best[0], candidate[0]), inner)
         return tuple(where(wins, new, old) for new, old in zip(candidate, best, strict=True))
@@ -232,10 +232,10 @@ def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
 
 
 def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels, rubs: Truth = True) -> Numbers:
-    """d(momentum)/dt of each wheel (N m) under the commanded motor torques (N m), at axial momenta (N m s) and body
+    """Return d(momentum)/dt of each wheel (N m) under the commanded motor torques (N m), at axial momenta (N m s) and body
     rate (rad/s): the command within the torque limit, faded out where it would carry the momentum beyond its limit (see
-    BAND), and friction against the speed relative to the body (see CREEP). Limits may be infinite. rubs: False leaves out
-    friction that is zero, which may change the sign of a zero, and no motion."""
+    BAND), and friction against the speed relative to the body (see CREEP). Limits may be infinite. rubs: False omits
+    friction that is zero, which may change the sign of a zero but no motion."""
     limit = limited(command, momentum, rate, wheels).torque_limit
     given = each(_driven, (command, momentum, limit, wheels.momentum_limit))
     # Reciprocals of constants, which a compiler takes out of the loop over the lanes.
@@ -243,7 +243,7 @@ def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels, rub
 
     def braked(*given: Scalar) -> Numbers:
         columns = (given, momentum, inverse, wheels.axes, wheels.viscous, wheels.coulomb)
-        # Row by row: within a branch short vectors are put together and taken apart for too little.
+        # Row by row: within a branch, assembling short vectors costs more than it saves.
         return tuple(map(partial(_braked, rate), *columns))
 
     given = when(rubs, braked, *given)
@@ -251,7 +251,7 @@ def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels, rub
 
 
 def _rubs(wheels: Wheels) -> Truth:
-    """Whether there is friction that `motor` must include; most bearings are modelled as ideal."""
+    """Return whether there is friction that `motor` must include; most bearings are modelled as ideal."""
     return less(0.0, reduce(plus, (*wheels.viscous, *wheels.coulomb)))
 
 
@@ -267,20 +267,20 @@ def _braked(
 
 
 def _room(command: Scalar, momentum: Scalar, limit: Scalar) -> Scalar:
-    """The share of its torque that the momentum leaves a motor, in the direction of the command."""
+    """Return the share of its torque that a motor has at this momentum in the direction of the command."""
     filled = momentum * (1.0 / limit)
     return _fraction((1.0 - where(less(0.0, command), filled, -filled)) * (1.0 / BAND))
 
 
 def available(command: Numbers, momentum: Numbers, wheels: Wheels) -> Numbers:
-    """The most that each motor gives now in the direction of its command (N m): its torque limit, faded out as its momentum
-    fills up."""
+    """Return the largest torque of each motor in the direction of its command (N m): its torque limit, faded out near its
+    momentum limit."""
     return each(_available, (command, momentum, wheels.torque_limit, wheels.momentum_limit))
 
 
 def _available(command: Scalar, momentum: Scalar, torque_limit: Scalar, momentum_limit: Scalar) -> Scalar:
     room = _room(command, momentum, momentum_limit)
-    # A zero share of an infinite torque is zero.
+    # A zero share of an infinite torque counts as zero.
     return where(less(0.0, room), room * torque_limit, 0.0)
 
 
@@ -289,13 +289,13 @@ def _fraction(x: Scalar) -> Scalar:
 
 
 def on_body(momentum_rate: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Vector:
-    """The torque of the wheels on the body (N m): -sum a_i h_i' - rate x sum a_i h_i."""
+    """Return the torque of the wheels on the body (N m): -sum a_i h_i' - rate x sum a_i h_i."""
     turning = add(weighted(momentum_rate, wheels.axes), cross(rate, wheel_momentum(momentum, wheels)))
     return scale(-1.0, turning)
 
 
 def wheel_momentum(momentum: Numbers, wheels: Wheels) -> Vector:
-    """The wheels' momentum in body axes (N m s): sum a_i h_i."""
+    """Return the wheels' momentum in body axes (N m s): sum a_i h_i."""
     return weighted(momentum, wheels.axes)
 
 
@@ -307,12 +307,12 @@ def make_wheels(
     viscous: float | Sequence[float] = 0.0,
     coulomb: float | Sequence[float] = 0.0,
 ) -> Wheels:
-    """Validated wheels from N spin axes (body; any length) and, for all or for each, rotor inertia (kg m2), torque limit
-    (N m; 0 for a wheel that takes no part), momentum limit (N m s), viscous (N m s) and Coulomb friction (N m). Limits may
-    be infinite.
+    """Return validated wheels from N spin axes (body; any length) and, for all or for each, rotor inertia (kg m2), torque
+    limit (N m; 0 for a wheel that takes no part), momentum limit (N m s), viscous (N m s) and Coulomb friction (N m).
+    Limits may be infinite.
 
-    Raises ValueError where a number is out of range, there are more than MOST wheels, fewer than three working wheels have
-    independent axes (it names the body direction without authority), or they lie so close to a plane that the matrix of the
+    Raise ValueError if a number is out of range, there are more than MOST wheels, fewer than three working wheels have
+    independent axes (it names the body direction without authority), or they lie so close to a plane that the matrix of
     axes has a condition number above 1000.
     """
     matrix = checked_axes(axes)
@@ -330,10 +330,10 @@ def make_wheels(
 
 
 def lose(wheels: Wheels, index: int) -> Wheels:
-    """The wheels after one of them (`index` counts from 0, messages from 1) has lost its motor: it takes no part in
-    allocation any more, its torque limit is 0, and its rotor only coasts down by friction.
+    """Return the wheels after one of them (`index` counts from 0, messages from 1) has lost its motor: it takes no part in
+    the allocation, its torque limit is 0, and its rotor coasts down by friction.
 
-    Raises ValueError where there is no such wheel, or the others no longer act about three axes (it names the body direction
+    Raise ValueError if there is no such wheel, or the others have no torque about three axes (it names the body direction
     without authority).
     """
     count = len(wheels.axes)
@@ -347,23 +347,23 @@ def lose(wheels: Wheels, index: int) -> Wheels:
 
 
 def capacity(state: State, params: Wheels) -> float:
-    """The norm (N m s) of the momentum that wheels in this state at the start can store before a motor fades, whatever its
-    direction, with least-squares allocation; 0 where one is there already."""
+    """Return the norm (N m s) of the momentum that wheels in this initial state can store in every direction before a motor
+    fades, with least-squares allocation; 0 if one fades already."""
     total = momentum(state, params)
     columns = zip(params.least, params.momentum_limit, state.momentum, strict=True)
-    # The part of the momenta that adds up to zero stays in the rotors.
+    # The null-space part of the momenta stays in the rotors.
     rooms = [((1.0 - BAND) * limit - abs(h + dot(row, total)), math.sqrt(dot(row, row))) for row, limit, h in columns]
     return max(0.0, min(room / share for room, share in rooms if share > 0.0))
 
 
 def sure_torque(params: Wheels, kind: Literal["axis", "norm"]) -> float:
-    """The torque (N m) that the wheels surely give as they share it out, in norm or about each body axis at once."""
+    """Return the torque (N m) available in every direction by the allocation, in norm or about each axis at once."""
     return authority(at_top_speed(as_known(params)), kind, peak=params.allocation == ALLOCATIONS.index("least-peak"))
 
 
 def shared_as(params: Wheels, known: Wheels, like: Wheels | None = None) -> Wheels:
-    """The wheels with a torque allocated, and their momentum measured, as for those that laws take them for, if these are
-    as many. like: those of a loop of the same form, for numbers that are recorded, which cannot be compared."""
+    """Return the wheels with the allocation and the momentum measurement of the wheels that laws assume, if these are as
+    many. like: the wheels of a loop of the same form, for recorded numbers, which cannot be compared."""
     if len(params.axes) != len(known.axes):
         return params
     axes = as_known(known).axes
@@ -372,14 +372,14 @@ def shared_as(params: Wheels, known: Wheels, like: Wheels | None = None) -> Whee
 
 
 def axial_inertia(params: Wheels) -> NDArray[np.float64]:
-    """The inertia of the rotors about their own axes as these are known (3, 3; kg m2)."""
+    """Return the inertia of the rotors about their assumed axes (3, 3; kg m2)."""
     return axial(np.array(as_known(params).axes), np.array(params.inertia))
 
 
 def gives_allocated_torque(wheels: Wheels) -> bool:
-    """Whether, within the wheels' limits, the torque on the body is the allocated one, and the momentum that laws are told
-    is theirs: not so while a lost wheel is still counted on, nor of wheels that are mounted otherwise than laws take them,
-    were it one that is lost and turns on."""
+    """Return whether, within the wheels' limits, the torque on the body is the allocated one, and the momentum given to
+    laws is correct: it is not while the allocation still uses a lost wheel, nor for misaligned wheels, even a lost one that
+    still turns."""
     if wheels.known_axes:
         return False
     working = [(axis, row) for axis, row, limit in zip(wheels.axes, wheels.least, wheels.torque_limit, strict=True) if limit]

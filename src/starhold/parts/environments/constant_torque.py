@@ -1,4 +1,4 @@
-"""A torque that never changes, in body or inertial axes: a leak, a residual dipole in a steady field, a thruster left
+"""A constant torque in body or inertial axes, as of a leak, a residual dipole in a steady field, or a thruster stuck
 open."""
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ class Params(NamedTuple):
     """The torque and its axes."""
 
     torque: Annotated[Vector, Parameter("N m", shape=(3,), spread=False, plain=(100.0, "mN m"), text="on the body")]
-    axes: Annotated[int, Parameter(choices=("body", "inertial"), text="in which it stays the same")] = 0
+    axes: Annotated[int, Parameter(choices=("body", "inertial"), text="in which it is constant")] = 0
 
 
 def torque(state: Any, params: Params, craft: Craft, memory: Any) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     return to_body(state.attitude, params.torque) if params.axes else params.torque
 
 
 def bound(params: Params, envelope: Envelope) -> Push:
-    """The norm of the torque."""
+    """Return the norm of the torque."""
     return Push(math.hypot(*params.torque))
 
 
 def examples() -> list[Params]:
-    """A torque of the size of air drag on a small satellite, in either axes."""
+    """Return a torque of the size of air drag on a small satellite, in body and in inertial axes."""
     return [Params((1e-5, -2e-5, 5e-6)), Params((1e-5, -2e-5, 5e-6), 1)]

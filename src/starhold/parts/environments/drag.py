@@ -1,4 +1,4 @@
-"""The torque of thin air on a spacecraft of flat plates, and its force where that is to move the orbit."""
+"""The aerodynamic torque on a spacecraft of flat plates, and the drag force if it is to move the orbit."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Params(NamedTuple):
         Parameter("m^2, 1, 1, 1, m, m, m", columns=COLUMNS, text=TEXT),
     ]
     coefficient: Annotated[float, Parameter("1", at_least=0.0, text="of drag, of each plate")] = 2.2
-    density: Annotated[float, Parameter("kg/m^3", at_least=0.0, text="at the height of reference")] = 6.967e-13
+    density: Annotated[float, Parameter("kg/m^3", at_least=0.0, text="at the reference height")] = 6.967e-13
     height: Annotated[float, Parameter("m", text="of reference, above the equatorial radius")] = 5e5
     scale_height: Annotated[float, Parameter("m", above=0.0, text="over which the density falls to 1/e")] = 6.3822e4
     rotation: Annotated[float, Parameter("1", at_least=0.0, text="of the air, as a share of the Earth's")] = 1.0
@@ -66,7 +66,7 @@ class Params(NamedTuple):
             "m, 1, kg/m^3",
             columns=("height", "flux", "density"),
             text="densities in place of the one above, a row for each height above the equatorial radius and solar flux; "
-            "between rows their logarithm goes along straight lines",
+            "between rows their logarithm is interpolated linearly",
         ),
     ] = ()
     flux: Annotated[float, Parameter("1", at_least=0.0, text="solar flux F10.7 (1e-22 W/(m^2 Hz)), for a table")] = 150.0
@@ -75,11 +75,11 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """For each plate its normal, and its area times its centre (m3); the coefficient of drag, half the density (kg/m3) at a
-    distance (m) from the Earth's centre, the scale height (m), and the rate of the air (rad/s).
+    """For each plate its normal, and its area times its centre (m3); the drag coefficient, half the density (kg/m3) at a
+    reference distance (m) from the Earth's centre, the scale height (m), and the rotation rate of the air (rad/s).
 
-    bends: of a table the further distances (m) and by how much the logarithm's slope (1/m) changes there, 0 at the last;
-    areas: of each plate, over the mass (m2/kg), () where the orbit is not moved."""
+    bends: for a table, the further distances (m) and the change of the logarithm's slope (1/m) at each, 0 at the last;
+    areas: of each plate, over the mass (m2/kg), () if the orbit is not moved."""
 
     normals: tuple[Vector, ...]
     arms: tuple[Vector, ...]
@@ -100,8 +100,8 @@ class Memory(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for a plate without direction, a table with gaps or without this solar flux, and a
-    force without a mass."""
+    """Return the numbers of a flight. Raise ValueError for a plate without direction, a table with gaps or without this
+    solar flux, and a force without a mass."""
     air = (params.density, params.height, params.scale_height, ())
     density, height, scale_height, bends = _layers(params.table, params.flux) if params.table else air
     areas, normals, centres = plates_of(params.plates)
@@ -120,7 +120,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def _layers(table: tuple[Layer, ...], flux: float) -> tuple[float, float, float, Buffer]:
-    """The density (kg/m3) at the lowest height (m) of a table, the scale height (m) of the lowest layer, and the bends."""
+    """Return density (kg/m3) and height (m) of a table's lowest row, the scale height (m) above it, and the bends."""
     given = {(height, at): density for height, at, density in table}
     heights, fluxes = (np.unique(column) for column in np.array(table)[:, :2].T)
     if len(heights) < 2 or len(given) != len(table) or len(table) != len(heights) * len(fluxes):
@@ -139,7 +139,7 @@ def _layers(table: tuple[Layer, ...], flux: float) -> tuple[float, float, float,
 
 
 def check_start(params: Numbers, start: Any, craft: Craft) -> None:
-    """Raise ValueError where a table does not cover the heights of the orbit at the start."""
+    """Raise ValueError if a table does not cover the heights of the orbit at the start."""
     if params.bends:
         ends = params.distance, params.bends[params.bends.size - 2]
         met = [find(start.position, start.velocity, craft.gravity) for find in (lowest, highest)]
@@ -150,17 +150,17 @@ def check_start(params: Numbers, start: Any, craft: Craft) -> None:
 
 
 def remember(params: Numbers) -> Memory:
-    """No air yet."""
+    """Return the initial memory, without air."""
     return Memory((1.0, 0.0, 0.0), 0.0)
 
 
 def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -> Memory:
-    """The air that the craft meets as the control step begins."""
+    """Return the air flow at the craft as the control step begins."""
     position = state.position
     wind = (-params.turn * position[1], params.turn * position[0], 0.0)
     through = subtract(state.velocity, wind)
     square = dot(position, position)
-    # In the form that the Earth's attraction has, so that a kernel computes it once.
+    # In the form used by the Earth's attraction, so that a kernel computes it once.
     distance = square * sqrt(1.0 / square)
     fallen = (params.distance - distance) * (1.0 / params.scale_height)
     if params.bends:
@@ -176,7 +176,7 @@ def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -
 
 
 def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector | None:
-    """Acceleration of the centre of mass (inertial, m/s2), None where the orbit is not moved."""
+    """Return the acceleration of the centre of mass (inertial, m/s2), None if the orbit is not moved."""
     if not params.areas:
         return None
     shown = cosines(params.normals, to_body(state.attitude, memory.course))
@@ -185,15 +185,15 @@ def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> V
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     course = to_body(state.attitude, memory.course)
-    # All forces are against the course.
+    # All forces point against the velocity relative to the air.
     shown = cosines(params.normals, course)
     return scale(params.coefficient * memory.pressure, cross(course, total(shown, params.arms)))
 
 
 def bound(params: Params, envelope: Envelope) -> Push:
-    """The largest norm of the torque, from any side, against the fastest wind in the densest air of the orbit."""
+    """Return a bound on the norm of the torque in any attitude, for the fastest wind and the densest air of the orbit."""
     numbers, nearest = prepare(params, 1.0), envelope.distance
     wind, turn = envelope.speed, params.rotation * TURN
     density, distance, thinning = numbers.density, numbers.distance, numbers.scale_height
@@ -202,7 +202,7 @@ def bound(params: Params, envelope: Envelope) -> Push:
         fallen = (distance - nearest) / thinning + sum(bend * max(nearest - begin, 0.0) for begin, bend in rows)
         slopes = accumulate((bend for _, bend in rows), initial=-1.0 / thinning)
         density, distance, thinning = density * math.exp(fallen), nearest, -1.0 / max(slopes)
-    # rho (v + turn r)^2 is largest at the lowest place, or higher up where air that hardly thins turns fast.
+    # rho (v + turn r)^2 is largest at the lowest point, or higher up in fast air of nearly constant density.
     place = max(nearest, 2.0 * thinning - wind / turn) if turn else nearest
     density = density * math.exp((distance - place) / thinning)
     size = largest_torque(numbers.normals, numbers.arms)
@@ -210,8 +210,8 @@ def bound(params: Params, envelope: Envelope) -> Push:
 
 
 def examples() -> list[Params]:
-    """The six sides of a 6U CubeSat with its centre of mass off the middle, one plate in denser air, and one that slows the
-    craft in air of a table."""
+    """Return the six sides of a 6U CubeSat with its centre of mass off the middle, one plate in denser air, and one plate
+    with a density table that moves the orbit."""
     plate = ((0.5, 0.0, 0.6, 0.8, 0.1, -0.2, 0.3),)
     air = ((2e5, 70.0, 1.8e-10), (2e5, 250.0, 3.5e-10), (9e5, 70.0, 1e-15), (9e5, 250.0, 5e-14))
     thick = Params(plate, 2.0, 2.418e-11, 3e5, 5.3628e4, 0.0)

@@ -1,4 +1,4 @@
-"""The torque of a point mass on a body that is no sphere."""
+"""The gravity-gradient torque of a point mass."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ Params = NoParams
 
 
 def torque(state: Any, params: NoParams, craft: Craft, memory: Any) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     n2, inverse_square = attraction(state.position, craft)
     return gravity_gradient(to_body(state.attitude, state.position), 3.0 * n2 * inverse_square, craft)
 
 
 def gravity_gradient(position: Vector, strength: Scalar, craft: Craft) -> Vector:
-    """Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2))."""
+    """Return the gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r^5 (1/(m2 s2))."""
     # R x J R has the form of a gyroscopic torque.
     return scale(strength, gyroscopic_torque(total_inertia(craft), position))
 
 
 def torque_change(params: NoParams, craft: Craft, envelope: Envelope) -> Push:
-    """The direction n turns in the body's axes by the body's rate and by v across over r, and n x Jn by no more than
-    (greatest - least moment) |n'|; 3 mu/r3 changes by no more than 3 v along/r of itself, and |n x Jn| is half of these at
-    most."""
+    """Return a bound on the rate of change of the torque. In body axes the direction n turns with the body's rate and the
+    transverse velocity over r, and |(n x Jn)'| <= (largest - least moment) |n'|; the relative rate of change of 3 mu/r^3 is
+    at most 3 radial velocity/r, and |n x Jn| is at most half the difference of moments."""
     moments = np.linalg.eigvalsh(tensor(total_inertia(craft)))
-    # A part more, for floats tell the moments.
+    # Slightly more, because the moments are floats.
     spread = float(moments[-1] - moments[0] + 1e-14 * moments[-1])
     strength = 3.0 * craft.gravity / envelope.distance**3 * spread
     return Push(strength * hypot(1.0, 1.5) * envelope.speed / envelope.distance, strength)
 
 
 def examples() -> list[NoParams]:
-    """The one torque there is."""
+    """Return the only instance."""
     return [NoParams()]

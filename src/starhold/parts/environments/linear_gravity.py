@@ -1,4 +1,4 @@
-"""Attraction by both bodies near a libration point: to first order in the distance from the point."""
+"""Attraction by both bodies near a libration point, to first order in the distance from the point."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ Params = NoParams
 
 
 def acceleration(state: PointState, params: NoParams, craft: Libration, memory: object) -> Vector:
-    """Acceleration without control, in the turning axes (scaled)."""
+    """Return the acceleration without control, in the turning axes (scaled)."""
     return linear(state.position, state.velocity, craft)
 
 
 def examples() -> list[NoParams]:
-    """The one field there is."""
+    """Return the only instance."""
     return [NoParams()]

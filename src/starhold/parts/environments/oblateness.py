@@ -1,4 +1,4 @@
-"""The flattening of the Earth, by which the plane of an orbit turns and its perigee wanders: J2."""
+"""The J2 acceleration of an oblate Earth, which turns the plane of an orbit and its perigee."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Params(NamedTuple):
     """The oblateness of the central body; the Earth's by default."""
 
     j2: Annotated[float, Parameter("1", text="second zonal harmonic, not normalised")] = 1.08262668e-3
-    radius: Annotated[float, Parameter("m", above=0.0, text="equatorial radius that it refers to")] = BODIES["Earth"].radius
+    radius: Annotated[float, Parameter("m", above=0.0, text="equatorial radius to which J2 refers")] = BODIES["Earth"].radius
 
 
 def acceleration(state: Any, params: Params, craft: Craft, memory: Any) -> Vector:
-    """Acceleration of the centre of mass in addition to that by a point mass (inertial, m/s2)."""
+    """Return the acceleration of the centre of mass in addition to that of a point mass (inertial, m/s2)."""
     n2, inverse_square = attraction(state.position, craft)
     size: Scalar = 1.5 * params.j2 * params.radius * params.radius * (n2 * inverse_square)
     x, y, z = scale(size, state.position)
@@ -38,11 +38,11 @@ def acceleration(state: Any, params: Params, craft: Craft, memory: Any) -> Vecto
 
 
 def perturbation(params: Params, craft: Craft, distance: float) -> tuple[float, float]:
-    """The largest acceleration (m/s2), and its largest gradient (1/s2), from a distance (m) on: both above the poles."""
+    """Return the largest acceleration (m/s2) and gradient (1/s2) of it from a distance (m) on: both above the poles."""
     size = params.j2 * craft.gravity * (params.radius / distance) ** 2 / distance**2
     return 3.0 * abs(size), 12.0 * abs(size) / distance
 
 
 def examples() -> list[Params]:
-    """The Earth, and Mars."""
+    """Return the Earth, and Mars."""
     return [Params(), Params(1.96045e-3, BODIES["Mars"].radius)]

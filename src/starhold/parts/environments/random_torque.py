@@ -1,4 +1,4 @@
-"""A random torque, new at each control step and held between."""
+"""A random torque, drawn at each control step and held in between."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ class Params(NamedTuple):
 
 
 def remember(params: Params) -> Vector:
-    """No torque yet."""
+    """Return the initial memory, without torque."""
     return ZERO
 
 
 def update(memory: Vector, state: Any, params: Params, dice: Dice, step: int) -> Vector:
-    """The torque of the control step that begins (N m)."""
+    """Return the torque of this control step (N m)."""
     return dice.vector(0, params.deviation)
 
 
 def torque(state: Any, params: Params, craft: Any, memory: Vector) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     return memory
 
 
 def noise(params: Params, period: float) -> Noise:
-    """That of the torque."""
+    """Return the noise of the torque."""
     return Noise(torque=params.deviation)
 
 
 def examples() -> list[Params]:
-    """The torque of the published noise study, and none."""
+    """Return the torque of the published noise study, and zero torque."""
     return [Params(1e-4), Params(0.0)]

@@ -1,4 +1,4 @@
-"""The torque of the Earth's magnetic field on the residual dipole of a spacecraft."""
+"""The torque of the Earth's magnetic field on a spacecraft's residual dipole."""
 
 from __future__ import annotations
 
@@ -43,30 +43,30 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
     return Numbers(params.dipole, magnetic_field.prepared(params.epoch, period))
 
 
 def remember(params: Numbers) -> Vector:
-    """No field yet."""
+    """Return the initial memory, without field."""
     return ZERO
 
 
 def update(memory: Vector, state: Any, params: Numbers, dice: Dice, step: int) -> Vector:
-    """The field where the control step begins (T, inertial axes)."""
+    """Return the field at the start of the control step (T, inertial axes)."""
     return magnetic_field.field_at(state.position, step, params.field)
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     return cross(params.dipole, to_body(state.attitude, memory))
 
 
 def bound(params: Params, envelope: Envelope) -> Push:
-    """The largest norm of the torque, across the strongest field at the least height of the orbit."""
+    """Return a bound on the norm of the torque, for a dipole across the strongest field at the least height of the orbit."""
     return Push(norm(params.dipole) * magnetic_field.strongest(params.epoch, envelope.distance))
 
 
 def examples() -> list[Params]:
-    """A CubeSat, and a larger craft at another time."""
+    """Return the dipole of a CubeSat, and of a larger craft at another time."""
     return [Params((0.01, -0.005, 0.02)), Params((0.0, 1.0, 0.3), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0))]

@@ -1,5 +1,5 @@
-"""The torque of sunlight on a spacecraft of flat plates, which the Earth's shadow ends, and its force where that is to move
-the orbit."""
+"""The torque of solar radiation pressure on a spacecraft of flat plates, with eclipse, and the force if it is to move the
+orbit."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Row: TypeAlias = tuple[float, float, float, float, float, float, float, float, f
 
 
 class Params(NamedTuple):
-    """The plates, and when they fly."""
+    """The plates and the epoch."""
 
     plates: Annotated[
         tuple[Row, ...],
@@ -59,11 +59,11 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """For each plate its normal, and the arms (m3) of absorbed, mirrored and scattered light: area and share times the
+    """For each plate its normal, and the arms (m3) of absorbed, specular and diffuse light: area times share times the
     centre, or times centre x normal; the Sun, and the control period (s).
 
-    push: where the orbit is moved, for each plate its area over the mass (m2/kg) times the share of absorbed light, and
-    along its normal twice that times the share of mirrored, and 2/3 of it times that of scattered light; else ()."""
+    push: if the orbit is moved, for each plate the area over the mass (m2/kg) times the share of absorbed light, and along
+    its normal twice that times the specular and 2/3 of it times the diffuse share; else ()."""
 
     normals: tuple[Vector, ...]
     taken: tuple[Vector, ...]
@@ -82,7 +82,7 @@ class Memory(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an impossible plate, a bad epoch, and a force without a mass."""
+    """Return the numbers of a flight. Raise ValueError for an impossible plate, a bad epoch, and a force without a mass."""
     shares = [row[7:] for row in params.plates]
     for number, (specular, diffuse) in enumerate(shares, 1):
         if not (specular >= 0.0 and diffuse >= 0.0 and specular + diffuse <= 1.0):
@@ -107,26 +107,26 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def remember(params: Numbers) -> Memory:
-    """No light yet."""
+    """Return the initial memory, without light."""
     return Memory((1.0, 0.0, 0.0), 0.0)
 
 
 def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -> Memory:
-    """The light where the control step begins."""
+    """Return the sunlight at the start of the control step."""
     seen = sun.sun(number_of(step) * params.period, params.sun)
     return Memory(seen.direction, sun.pressure(seen) * sun.in_view(state.position, seen))
 
 
 def _seen(state: Any, params: Numbers, memory: Memory) -> tuple[Vector, tuple[Scalar, ...], tuple[Scalar, ...]]:
-    """The direction to the Sun (body axes), the cosines of the plates to it, 0 for those that look away, and their
-    squares."""
+    """Return the direction to the Sun (body axes), the cosines of the plates' angles to it, 0 for those facing away, and
+    their squares."""
     toward = to_body(state.attitude, memory.direction)
     seen = cosines(params.normals, toward)
     return toward, seen, tuple(cosine * cosine for cosine in seen)
 
 
 def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector | None:
-    """Acceleration of the centre of mass (inertial, m/s2), None where the orbit is not moved."""
+    """Return the acceleration of the centre of mass (inertial, m/s2), None if the orbit is not moved."""
     if not params.push:
         return None
     toward, seen, squares = _seen(state, params, memory)
@@ -136,26 +136,26 @@ def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> V
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
 
     def pushed(_: Vector) -> tuple[Vector]:
         toward, seen, squares = _seen(state, params, memory)
         along = total((*squares, *seen), (*params.mirrored, *params.scattered))
         return (scale(-memory.pressure, add(cross(total(seen, params.taken), toward), along)),)
 
-    # The Earth's shadow takes a third of many orbits.
+    # A third of many orbits lies in the Earth's shadow.
     (torque,) = when(less(0.0, memory.pressure), pushed, ZERO)
     return torque
 
 
 def bound(params: Params, envelope: Envelope) -> Push:
-    """The largest norm of the torque, from any side, at the perihelion."""
+    """Return a bound on the norm of the torque in any attitude, at the perihelion."""
     numbers = prepare(params, 1.0)
     return Push(sun.STRONGEST * largest_torque(*numbers[:4]))
 
 
 def examples() -> list[Params]:
-    """The six sides of a 6U CubeSat, and one mirror at another time that light pushes along."""
+    """Return the six sides of a 6U CubeSat, and one mirror at another time that moves the orbit."""
     sides = tuple((*row, 0.1, 0.3) for row in BOX)
     mirror, epoch = ((0.5, 0.0, 0.6, 0.8, 0.1, -0.2, 0.3, 0.9, 0.05),), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0)
     return [Params(sides), Params(mirror, epoch, moves_orbit=1, mass=12.0, ephemeris=1)]

@@ -19,10 +19,10 @@ Params = NoParams
 
 
 def acceleration(state: PointState, params: NoParams, craft: Libration, memory: object) -> Vector:
-    """Acceleration without control, in the turning axes (scaled)."""
+    """Return the acceleration without control, in the turning axes (scaled)."""
     return nonlinear(state.position, state.velocity, craft)
 
 
 def examples() -> list[NoParams]:
-    """The one field there is."""
+    """Return the only instance."""
     return [NoParams()]

@@ -1,4 +1,4 @@
-"""A torque over time, from a table: plume impingement, a release, a telemetered disturbance."""
+"""A torque over time from a table, as of plume impingement, a release, or a disturbance from telemetry."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The table as kernels read it. ValueError where its times do not increase, or it has less than two rows."""
+    """Return the table as kernels read it. Raise ValueError if its times do not increase, or it has fewer than two rows."""
     times = np.array([row[0] for row in params.table])
     if len(times) < 2 or not (np.diff(times) > 0.0).all():
         raise ValueError("the table needs at least two rows, with times that increase")
@@ -53,12 +53,12 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def remember(params: Numbers) -> Vector:
-    """No torque yet."""
+    """Return the initial memory, without torque."""
     return ZERO
 
 
 def update(memory: Vector, state: Any, params: Numbers, dice: Dice, step: int) -> Vector:
-    """The torque of the control step that begins, in the table's axes (N m)."""
+    """Return the torque at the start of the control step, in the table's axes (N m)."""
     time = number_of(step) * params.period
 
     def piece(k: Any, value: Vector) -> tuple[Vector]:
@@ -73,16 +73,16 @@ def update(memory: Vector, state: Any, params: Numbers, dice: Dice, step: int) -
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     return to_body(state.attitude, memory) if params.axes else memory
 
 
 def bound(params: Params, envelope: Envelope) -> Push:
-    """The largest norm of the torque: along a straight line the norm is largest at an end."""
+    """Return the largest norm of the torque: along a straight line it is largest at an end."""
     return Push(max(math.hypot(*row[1:]) for row in params.table))
 
 
 def examples() -> list[Params]:
-    """A push of two seconds, in either axes."""
+    """Return a push of two seconds, in body and in inertial axes."""
     rows = ((1.0, 0.0, 0.0, 0.0), (2.0, 1e-4, 0.0, -5e-5), (3.0, 0.0, 0.0, 0.0))
     return [Params(rows), Params(rows, 1)]

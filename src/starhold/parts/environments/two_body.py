@@ -1,4 +1,4 @@
-"""Attraction by a point mass, in whose field the body is on an orbit."""
+"""Attraction by the point mass that the body orbits."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ Params = NoParams
 
 
 def acceleration(state: Any, params: NoParams, craft: Craft, memory: Any) -> Vector:
-    """Acceleration of the centre of mass (inertial, m/s2)."""
+    """Return the acceleration of the centre of mass (inertial, m/s2)."""
     return scale(-attraction(state.position, craft)[0], state.position)
 
 
 def attraction(position: Vector, craft: Craft) -> tuple[Scalar, Scalar]:
-    """mu/r3 and 1/r2, with one division."""
+    """Return mu/r^3 and 1/r^2, with one division."""
     inverse_square = 1.0 / dot(position, position)
     return craft.gravity * inverse_square * sqrt(inverse_square), inverse_square
 
 
 def examples() -> list[NoParams]:
-    """The one field there is."""
+    """Return the only instance."""
     return [NoParams()]

@@ -1,5 +1,4 @@
-"""Attitude and gyro bias by a filter of fixed gains: the gyro carries the attitude on, and each new attitude corrects
-both."""
+"""Attitude and gyro bias by a fixed-gain filter: the gyro propagates the attitude, and each new attitude corrects both."""
 
 from __future__ import annotations
 
@@ -36,14 +35,14 @@ class Params(NamedTuple):
     """The gains of the filter, and its initial attitude."""
 
     attitude_gain: Annotated[
-        float, Parameter("1", above=0.0, at_most=1.0, text="share of an attitude's error corrected at once")
+        float, Parameter("1", above=0.0, at_most=1.0, text="share of an attitude error corrected at once")
     ]
-    bias_gain: Annotated[float, Parameter("1/s", at_least=0.0, text="rate of the bias for a radian of error")]
+    bias_gain: Annotated[float, Parameter("1/s", at_least=0.0, text="change of the bias per second and per radian of error")]
     start: Annotated[Quaternion, START] = NO_TURN
 
 
 class Estimate(NamedTuple):
-    """Attitude, rate without the bias, the bias, and whether an attitude has come yet."""
+    """Attitude, rate corrected for the bias, the bias, and whether an attitude has arrived yet."""
 
     attitude: Annotated[Quaternion, Quantity("1", "estimated attitude, inertial to body, scalar first", "quaternion")]
     rate: Annotated[Vector, Quantity("rad/s", "estimated angular velocity, body axes", "axis")]
@@ -52,7 +51,7 @@ class Estimate(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The attitude predicted for the next control step, the bias (rad/s), and whether an attitude has come yet (1)."""
+    """The attitude predicted for the next control step, the bias (rad/s), and whether an attitude has arrived yet (1)."""
 
     attitude: Quaternion
     bias: Vector
@@ -60,17 +59,17 @@ class Memory(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Params:
-    """The parameters with the start as a unit quaternion. ValueError for a start that is no quaternion."""
+    """Return the parameters with the initial attitude as a unit quaternion. Raise ValueError if it is no quaternion."""
     return params._replace(start=unit_quaternion(params.start))
 
 
 def remember(params: Params, state: Any) -> Memory:
-    """The filter begins with the attitude stated for the start."""
+    """Return the initial memory, with the stated initial attitude."""
     return Memory(params.start, ZERO, 0.0)
 
 
 def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
-    """The estimate at a control step, and the prediction for the next."""
+    """Return the estimate at a control step, and the memory with the prediction for the next."""
     memory = _started(memory, readings)
     (measured, new), *others = seen = attitudes_of(readings)
     if others:
@@ -89,7 +88,7 @@ def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period
 
 
 def _started(memory: Memory, readings: Any) -> Memory:
-    """The memory with the attitude of another estimator in place of the one stated for the start."""
+    """Return the memory with the attitude of another estimator in place of the stated initial one."""
     if not hasattr(readings, FIX):
         return memory
     first = both(less(0.5, readings.fix.is_valid), less(memory.begun, 0.5))
@@ -97,5 +96,5 @@ def _started(memory: Memory, readings: Any) -> Memory:
 
 
 def examples() -> list[Params]:
-    """A slow filter, and one that trusts its attitudes."""
+    """Return a slow filter, and one that trusts its attitudes."""
     return [Params(0.05, 0.002), Params(1.0, 0.0, (0.6, 0.0, 0.8, 0.0))]

@@ -1,5 +1,5 @@
-"""Attitude, and rate or a gyro's bias, from the magnetic field alone, by an extended Kalman filter that restarts where the
-fields measured contradict it: for a body that tumbles, and of which nothing is known."""
+"""Attitude, and rate or gyro bias, from the magnetic field alone, for a tumbling body of unknown attitude, by an extended
+Kalman filter that restarts when the measured fields contradict it."""
 
 from __future__ import annotations
 
@@ -77,25 +77,26 @@ FIRST = dict.fromkeys(("rate", "gyro_bias", "attitude_deviation", "rate_deviatio
 }
 HOUR = 3600.0
 MEAN = 100.0
-"""Measurements over which squares of what they are off are averaged."""
+"""Number of measurements over which squared residuals are averaged."""
 DOUBT, TRUST = 2.0, 1.25
-"""The filter restarts where that mean, 1 for a consistent filter, is above the first, and is not valid above the second."""
+"""The filter restarts if that mean, 1 for a consistent filter, is above the first, and is not valid above the second."""
 SPREAD = 0.5
 """The sine of the angle by which the field must have turned, in inertial axes, since the filter began."""
 TINY = 1e-12
 
 
 class Params(NamedTuple):
-    """The deviations that the filter assumes: of the field, of a gyro in the terms of that sensor, else of the rate."""
+    """The standard deviations that the filter assumes: of the field, and of a gyro in that sensor's terms, or without one
+    of the rate."""
 
     field: Annotated[
-        float, Parameter("T", above=0.0, text="deviation of each component of the field from the one computed, bias and all")
+        float, Parameter("T", above=0.0, text="standard deviation of each field component from the model, bias included")
     ]
     noise: Annotated[float, GYRO_NOISE] = 0.0
     bias_walk: Annotated[float, GYRO_WALK] = 0.0
     bias: Annotated[float, GYRO_BIAS] = 0.01
     rate: Annotated[
-        float, Parameter("rad/s", above=0.0, text="without a gyro: deviation of the rate about each axis at the start")
+        float, Parameter("rad/s", above=0.0, text="without a gyro: standard deviation of the initial rate about each axis")
     ] = math.radians(10.0)
     rate_walk: Annotated[
         float,
@@ -103,22 +104,22 @@ class Params(NamedTuple):
             "rad/s",
             also="rad/s/sqrt(s)",
             at_least=0.0,
-            text="without a gyro: deviation of the rate's change in 1 s by torques that the filter does not know",
+            text="without a gyro: standard deviation of the rate's change in 1 s by unknown torques",
         ),
     ] = 3e-4
     start: Annotated[Quaternion, ATTITUDE] = NO_TURN
     start_deviation: Annotated[
-        float, Parameter("rad", above=0.0, text="of that attitude: deviation about each axis; nothing is known if absent")
+        float, Parameter("rad", above=0.0, text="standard deviation of that attitude about each axis; unknown if absent")
     ] = math.inf
-    valid_within: Annotated[
-        float, Parameter("rad", above=0.0, text="largest deviation of an attitude that counts as valid")
-    ] = math.radians(5.0)
+    valid_within: Annotated[float, Parameter("rad", above=0.0, text="largest standard deviation of a valid attitude")] = (
+        math.radians(5.0)
+    )
     epoch: Annotated[Date, EPOCH] = START
 
 
 class Drive(NamedTuple):
-    """Variances of the bias or rate at the start, and of a gyro's reading (rad2/s2); what a control period adds to those of
-    attitude, attitude with bias or rate, and bias or rate."""
+    """Variances of the initial bias or rate, and of a gyro's reading (rad2/s2); the process noise of a control period in
+    the covariances of attitude, attitude with bias or rate, and bias or rate."""
 
     begin: Scalar
     reading: Scalar
@@ -128,8 +129,8 @@ class Drive(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The attitude stated for the start, whether the filter relies on it (1), and its variance (rad2); the field and its
-    variance (T2); the variances with a gyro and without; the largest deviation of an attitude that counts as valid (rad)."""
+    """The stated initial attitude, whether the filter relies on it (1), and its variance (rad2); the field and its variance
+    (T2); the variances with a gyro and without; the largest standard deviation of a valid attitude (rad)."""
 
     start: Quaternion
     begun: Scalar
@@ -142,21 +143,21 @@ class Numbers(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """Attitude, rate, the gyro's bias, standard deviations, how far measurements are off, and whether all fits."""
+    """Attitude, rate, gyro bias, standard deviations, the mean square residual, and whether the estimate is valid."""
 
     attitude: Annotated[Quaternion, Quantity("1", "estimated attitude, inertial to body, scalar first", "quaternion")]
     rate: Annotated[Vector, Quantity("rad/s", "estimated angular velocity, body axes", "axis")]
     gyro_bias: Annotated[Vector, Quantity("rad/s", "estimated bias of the gyro, 0 without one", "axis")]
     attitude_deviation: Annotated[Vector, Quantity("rad", "standard deviation of its error, body axes", "axis")]
     rate_deviation: Annotated[Vector, Quantity("rad/s", "standard deviation of its error, body axes", "axis")]
-    surprise: Annotated[float, Quantity("1", "mean square of what fields are off, over that expected")]
+    surprise: Annotated[float, Quantity("1", "mean square residual of the field, over that expected")]
     is_valid: Annotated[float, VALID]
 
 
 class Memory(NamedTuple):
-    """The attitude, the bias or the rate, and the gyro's reading (rad/s) at the last control step; the covariance of the
-    errors of attitude (rad, body axes) and bias or rate in blocks; the mean of squares; whether the filter has begun (1);
-    the direction of the field then (inertial), the largest sine of its angle to one since; and control steps so far."""
+    """The attitude, the bias or rate, and the gyro's reading (rad/s) at the last control step; the block covariance of the
+    errors of attitude (rad, body axes) and bias or rate; the mean square residual; whether the filter has begun (1); the
+    field's direction then (inertial), and the largest sine of its angle to a later one; and the number of control steps."""
 
     attitude: Quaternion
     slow: Vector
@@ -172,8 +173,8 @@ class Memory(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step. ValueError for a start that is no quaternion, and an epoch at which the field is not
-    known."""
+    """Return the numbers of a control step. Raise ValueError for an initial attitude that is no quaternion, and an epoch at
+    which the field is not known."""
     known = params.start_deviation < math.inf
     return Numbers(
         unit_quaternion(params.start),
@@ -193,20 +194,20 @@ def _drive(begin: float, noise: float, walk: float, sign: float, period: float) 
 
 
 def remember(params: Numbers, state: Any) -> Memory:
-    """The filter begins with the attitude stated for the start, and at rest."""
+    """Return the initial memory, with the stated initial attitude, at rest."""
     square, nothing = params.start_turn, (ZERO, ZERO, ZERO)
     turn = diagonal((square, square, square))
     return Memory(params.start, ZERO, ZERO, turn, nothing, nothing, 1.0, params.begun, ZERO, params.begun, 0.0)
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
-    """The estimate at a control step."""
+    """Return the estimate at a control step, and the new memory."""
     with_gyro = hasattr(readings, "rate")
     drive = params.gyro if with_gyro else params.free
     reading = readings.rate if with_gyro else ZERO
     begin = diagonal((drive.begin, drive.begin, drive.begin))
     ahead = propagated(memory, reading, drive, craft, period, with_gyro)
-    # The first step has nothing before it to begin from.
+    # Before the first step there is nothing to propagate.
     before = chosen(less(0.5, memory.steps), ahead, memory._replace(walk=begin))
     true = magnetic_field.field(readings.position, memory.steps * period, params.field)
     astray = either(less(memory.begun, 0.5), less(DOUBT, memory.surprise))
@@ -222,7 +223,7 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
 
 
 def propagated(memory: Memory, reading: Vector, drive: Drive, craft: Craft, period: Scalar, with_gyro: bool) -> Memory:
-    """The estimate a control period on."""
+    """Return the estimate propagated by a control period."""
     slow = memory.slow
     if with_gyro:
         old, new, kept, sign = subtract(memory.reading, slow), subtract(reading, slow), IDENTITY, -1.0
@@ -232,7 +233,7 @@ def propagated(memory: Memory, reading: Vector, drive: Drive, craft: Craft, peri
         slow = new = add(slow, scale(period, _acceleration(middle, craft)))
         sign, slope = 1.0, _slope(middle, craft)
         kept = summed(IDENTITY, product(slope, combine(period, IDENTITY, 0.5 * period * period, slope)))
-    # The second term is of a rate whose direction changes.
+    # The second term accounts for the changing direction of the rate.
     turn = short_turn(add(scale(0.25 * period, add(old, new)), scale(period * period / 24.0, cross(old, new))))
     axes = from_quaternion(turn)
     drift = combine(0.5 * sign * period, axes, 0.5 * sign * period, kept)
@@ -250,12 +251,12 @@ def propagated(memory: Memory, reading: Vector, drive: Drive, craft: Craft, peri
 
 
 def _acceleration(rate: Vector, craft: Craft) -> Vector:
-    """The angular acceleration of a body without torque (rad/s2)."""
+    """Return the angular acceleration of a body without torque (rad/s2)."""
     return scale(-1.0, apply(craft.inverse_inertia, gyroscopic_torque(craft.inertia, rate)))
 
 
 def _slope(rate: Vector, craft: Craft) -> Matrix:
-    """The derivative of that acceleration by the rate (1/s)."""
+    """Return the derivative of that acceleration with respect to the rate (1/s)."""
     inertia, inverted = craft.inertia, craft.inverse_inertia
     spun = apply(inertia, rate)
     x, y, z = (apply(inverted, subtract(cross(spun, axis), cross(rate, apply(inertia, axis)))) for axis in IDENTITY)
@@ -263,11 +264,11 @@ def _slope(rate: Vector, craft: Craft) -> Matrix:
 
 
 def aligned(now: Memory, shown: Vector, true: Vector, params: Numbers, begin: Matrix) -> Memory:
-    """Return the estimate at a restart: the attitude is turned as little as the measured field requires, and is unknown
-    about the field; bias or rate stay, with the initial variance."""
+    """Return the estimate at a restart: the attitude is turned by the smallest rotation onto the measured field, and its
+    rotation about the field is unknown; bias or rate are kept, with the initial variance."""
     foretold, size = to_body(now.attitude, true), maximum(norm(shown), TINY)
     old, new = scale(1.0 / maximum(norm(foretold), TINY), foretold), scale(1.0 / size, shown)
-    # Opposite fields are turned by a turn about any axis.
+    # For opposite fields the axis of the rotation is arbitrary.
     turn = normalise((maximum(1.0 + dot(old, new), 1e-6), *cross(new, old)))
     return now._replace(
         attitude=normalise(multiply(now.attitude, turn)),
@@ -282,10 +283,10 @@ def aligned(now: Memory, shown: Vector, true: Vector, params: Numbers, begin: Ma
 
 
 def corrected(now: Memory, shown: Vector, true: Vector, params: Numbers) -> Memory:
-    """The estimate corrected by a field, which an error of the attitude turns: off = B x error."""
+    """Return the estimate corrected by a field measurement: an attitude error turns the field, off = B x error."""
     foretold = to_body(now.attitude, true)
     off, row = subtract(shown, foretold), skew(foretold)
-    # Of the predicted field with the errors of attitude and of bias or rate.
+    # Covariances of the predicted field with the errors of attitude and of bias or rate.
     of_turn, of_slow = product(row, now.turn), product(row, now.mixed)
     sure = inverse(symmetric(along_diagonal(product(of_turn, transpose(row)), params.seen)))
     turning, slowing = product(transpose(of_turn), sure), product(transpose(of_slow), sure)
@@ -302,6 +303,6 @@ def corrected(now: Memory, shown: Vector, true: Vector, params: Numbers) -> Memo
 
 
 def examples() -> list[Params]:
-    """A magnetometer with a MEMS gyro, and an attitude that is known at the start."""
+    """Return a magnetometer with a MEMS gyro, and a known initial attitude."""
     small = Params(2e-7, math.radians(0.3) / 60.0, math.radians(5.0) / HOUR)
     return [small, small._replace(rate=0.02, start=(0.6, 0.0, 0.8, 0.0), start_deviation=0.02)]

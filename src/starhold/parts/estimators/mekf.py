@@ -1,5 +1,5 @@
-"""Attitude and gyro bias by the multiplicative extended Kalman filter: the gyro carries the attitude on; new attitudes of
-star trackers, and directions if they are selected, correct both, by gains that follow from their covariances."""
+"""Attitude and gyro bias by the multiplicative extended Kalman filter: the gyro propagates the attitude; new attitudes of
+star trackers, and directions if selected, correct both with gains from the covariances."""
 
 from __future__ import annotations
 
@@ -82,41 +82,41 @@ ASSUMES = {"attitude": ("cross", "roll", "boresight")}
 FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO, "is_valid": 0.0}
 HOUR = 3600.0
 MOST = 100_000
-"""Control periods after which a filter has settled, or does not."""
+"""Control periods within which a filter settles or never does."""
 UNKNOWN = math.sqrt(math.pi**2 / 9.0 + 2.0 / 3.0)
-"""Standard deviation about each axis (rad) of the rotation vector of an attitude that may be any."""
+"""Standard deviation about each axis (rad) of the rotation vector of a uniformly distributed attitude."""
 
 Tracker: TypeAlias = tuple[float, float, float, float, float]
 
 
 class Params(NamedTuple):
-    """The noise of gyro and star tracker that the filter assumes, in the terms of those sensors."""
+    """The noise of gyro and star tracker that the filter assumes, in those sensors' terms."""
 
     noise: Annotated[float, GYRO_NOISE]
     bias_walk: Annotated[float, GYRO_WALK]
     bias: Annotated[float, GYRO_BIAS]
     cross: Annotated[
-        float, Parameter("rad", above=0.0, text="of the star tracker: deviation across the boresight; its own if absent")
+        float, Parameter("rad", above=0.0, text="star tracker: standard deviation across boresight; the sensor's if absent")
     ] = math.inf
     roll: Annotated[
-        float, Parameter("rad", above=0.0, text="of the star tracker: deviation about the boresight; its own if absent")
+        float, Parameter("rad", above=0.0, text="star tracker: standard deviation about boresight; the sensor's if absent")
     ] = math.inf
     boresight: Annotated[
-        Vector, Parameter("1", shape=(3,), spread=False, text="of the star tracker, body axes; its own if absent")
+        Vector, Parameter("1", shape=(3,), spread=False, text="of the star tracker, body axes; the sensor's if absent")
     ] = (0.0, 0.0, 1.0)
     start: Annotated[Quaternion, START] = NO_TURN
     start_deviation: Annotated[
-        float, Parameter("rad", above=0.0, text="of that attitude: deviation about each axis; 76 deg if nothing is known")
+        float, Parameter("rad", above=0.0, text="standard deviation of that attitude about each axis; 76 deg if unknown")
     ] = UNKNOWN
     valid_within: Annotated[
-        float, Parameter("rad", above=0.0, text="largest deviation of an attitude that counts as valid; any if absent")
+        float, Parameter("rad", above=0.0, text="largest standard deviation of a valid attitude; any if absent")
     ] = math.inf
     more_trackers: Annotated[
         tuple[Tracker, ...],
         Parameter(
             "rad, rad, 1, 1, 1",
             columns=("cross", "roll", "x", "y", "z"),
-            text="a row for each star tracker after the first: its deviations and boresight; theirs if absent",
+            text="a row for each star tracker after the first: standard deviations and boresight; the sensors' if absent",
         ),
     ] = ()
     sun: Annotated[float, vectors.deviation("the Sun's direction")] = math.inf
@@ -127,8 +127,8 @@ class Params(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """Attitude, rate without the bias, the bias, the standard deviations of attitude and bias, and whether a first attitude
-    has come and that of the attitude is small enough."""
+    """Attitude, rate corrected for the bias, the bias, the standard deviations of attitude and bias, and whether a first
+    attitude has arrived and its standard deviation is small enough."""
 
     attitude: Annotated[Quaternion, Quantity("1", "estimated attitude, inertial to body, scalar first", "quaternion")]
     rate: Annotated[Vector, Quantity("rad/s", "estimated angular velocity, body axes", "axis")]
@@ -139,32 +139,32 @@ class Estimate(NamedTuple):
 
 
 def needs(params: Params) -> tuple[str, ...]:
-    """Return the readings that it takes: of star trackers, or what another estimator begins with, and of directions."""
+    """Return the readings that it takes: those of star trackers, or the estimate of another estimator, and directions."""
     return ("attitude" if trackers_of(params) else FIX, "rate", *vectors.needed(params))
 
 
 def about(params: Params) -> str:
-    """Return the body that its orbit must be about: Sun and field are known near the Earth."""
+    """Return the body that it must orbit: Sun and field are modelled near the Earth."""
     return "Earth" if min(params.sun, params.field) < math.inf else ""
 
 
 def trackers_of(params: Params) -> tuple[Tracker, ...]:
-    """The star trackers; with directions there may be none."""
+    """Return the star trackers; with directions there may be none."""
     first = (params.cross, params.roll, *params.boresight)
     none = vectors.needed(params) and not params.more_trackers and params.cross == params.roll == math.inf
     return () if none else (first, *params.more_trackers)
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step. ValueError for a boresight without direction, a start that is no quaternion, a tracker
-    without noise, or an epoch at which a direction is not known."""
+    """Return the numbers of a control step. Raise ValueError for a boresight without direction, an initial attitude that is
+    no quaternion, a tracker without noise, or an epoch at which a direction is not known."""
     directions = vectors.known_from(params, params.epoch, params.ephemeris) if vectors.needed(params) else ()
     trackers: list[Matrix] = []
     for cross, roll, *boresight in trackers_of(params):
         if not 0.0 < min(cross, roll) <= max(cross, roll) < math.inf:
             raise ValueError("the deviations cross and roll of each star tracker must be above 0, here or in its own table")
         trackers.append(spread_of(cross, roll, cast(Vector, tuple(boresight))))
-    # The rate between two readings is their mean: each turns the attitude by its noise for half a period, and so does the
+    # The rate between two readings is their mean: the noise of each turns the attitude for half a period, and so does the
     # step of the bias between them.
     walk = params.bias_walk**2 / HOUR * period
     reading = 0.25 * params.noise**2 * period
@@ -187,12 +187,12 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def spread_of(cross: float, roll: float, boresight: Vector) -> Matrix:
-    """The covariance of the error of a star tracker's attitude (rad2, body axes)."""
+    """Return the covariance of a star tracker's attitude error (rad2, body axes)."""
     return along_axis(unit_boresight(boresight), roll**2, cross**2)
 
 
 def remember(params: Numbers, state: Any) -> Memory:
-    """The filter begins with the attitude stated for the start."""
+    """Return the initial memory, with the stated initial attitude."""
     square, begin = params.start_turn, params.bias
     nothing: Matrix = (ZERO, ZERO, ZERO)
     turn, walk = diagonal((square, square, square)), diagonal((begin, begin, begin))
@@ -200,7 +200,7 @@ def remember(params: Numbers, state: Any) -> Memory:
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
-    """The estimate at a control step."""
+    """Return the estimate at a control step, and the new memory."""
     heads, params = latest(readings, params)
     pairs = directed(readings, memory, params, period)
     foretold = propagated(memory, readings.rate, params, period)
@@ -225,8 +225,8 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
 
 
 def latest(readings: Any, params: Numbers) -> tuple[list[Head], Numbers]:
-    """The attitude by all star trackers, if there are any, with whether it is new; and the numbers with its covariance for
-    that of one tracker."""
+    """Return the combined attitude of all star trackers, if there are any, and whether it is new; and the numbers with its
+    covariance in place of one tracker's."""
     seen = attitudes_of(readings) if params.tracker else []
     if not params.weights:
         return seen[:1], params
@@ -235,7 +235,7 @@ def latest(readings: Any, params: Numbers) -> tuple[list[Head], Numbers]:
 
 
 def directed(readings: Any, memory: Memory, params: Numbers, period: Scalar) -> list[vectors.Pair]:
-    """The directions; none is there before the step after the first attitude, which may have been made of them."""
+    """Return the directions, none until the step after the first attitude, which may have been computed from them."""
     if not params.directions:
         return []
     begun = less(1.5, memory.stage)
@@ -244,7 +244,8 @@ def directed(readings: Any, memory: Memory, params: Numbers, period: Scalar) -> 
 
 
 def started(now: Instant, readings: Any, params: Numbers) -> Instant:
-    """The estimate with the attitude of another estimator in place of the one stated for the start, with that deviation."""
+    """Return the estimate with the attitude of another estimator in place of the stated initial one, with the latter's
+    standard deviation."""
     if not hasattr(readings, FIX):
         return now
     square = params.start_turn
@@ -254,9 +255,9 @@ def started(now: Instant, readings: Any, params: Numbers) -> Instant:
 
 
 def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recursion | None:
-    """How noise of gyro and star trackers drives the errors of attitude and bias and that of the gyro's last reading, at a
-    constant rate (rad/s, body axes) of a filter that has settled; None for one that does not, that counts other trackers
-    than there are, or that takes directions."""
+    """Return the recursion by which noise of gyro and star trackers drives the errors of attitude, bias and the gyro's last
+    reading, for a settled filter at a constant rate (rad/s, body axes); None if it does not settle, has rows for other
+    trackers than exist, or takes directions."""
     numbers = prepare(params, period)
     if numbers.directions or len(params.more_trackers) != len(noise.more):
         return None
@@ -290,7 +291,7 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
 
 @cache
 def settled(params: Numbers, every: int, rate: Vector, period: float) -> Gains | None:
-    """The gains after many new attitudes at a constant rate; None where they go on changing."""
+    """Return the gains after many new attitudes at a constant rate; None if they do not converge."""
     memory, before = remember(params, None)._replace(rate=rate), np.zeros((4, 3, 3))
     for _ in range(MOST // every):
         for _ in range(every - 1):
@@ -306,8 +307,8 @@ def settled(params: Numbers, every: int, rate: Vector, period: float) -> Gains |
 
 
 def examples() -> list[Params]:
-    """A small tracker with a MEMS gyro, a good gyro with a tracker that is as sure about every axis, and the small ones with
-    Sun, field and nadir."""
+    """Return a small tracker with a MEMS gyro, a good gyro with a tracker of equal accuracy about all axes, and the first
+    with Sun, field and nadir."""
     arcsec = math.radians(1.0 / 3600.0)
     small = Params(math.radians(0.15) / 60.0, math.radians(3.0) / HOUR, 1e-3, 6.0 * arcsec, 40.0 * arcsec, (0.0, 0.6, 0.8))
     fine = Params(1e-6, 1e-7, 1e-5, 3.0 * arcsec, 3.0 * arcsec)

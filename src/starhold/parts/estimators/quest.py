@@ -1,5 +1,5 @@
-"""The attitude that fits all directions best, of Sun, magnetic field and the Earth's centre, each with its weight; the gyro
-carries it on where fewer than two are there."""
+"""The attitude of best weighted fit to the directions of Sun, magnetic field and the Earth's centre; the gyro propagates it
+while fewer than two are available."""
 
 from __future__ import annotations
 
@@ -41,19 +41,17 @@ NEEDS = ("sun", "sun_is_seen", "magnetic_field", "position", "rate")
 SEVERAL = vectors.SEVERAL
 FIRST = {"attitude_age": 0.0, "is_valid": 0.0}
 STEPS = 8
-"""Newton's steps from the sum of the weights down to the largest eigenvalue."""
+"""Number of Newton steps from the sum of the weights down to the largest eigenvalue."""
 remember = attitude_at_start
 
 
 class Params(NamedTuple):
-    """When the flight begins, the deviations of directions that weights follow from, and how near two of them may be."""
+    """The epoch, the standard deviations of directions that give the weights, and the least angle between two of them."""
 
     epoch: Annotated[Date, EPOCH] = START
-    sun: Annotated[float, Parameter("rad", above=0.0, text="assumed deviation of the Sun's direction")] = math.radians(0.5)
-    field: Annotated[float, Parameter("rad", above=0.0, text="assumed deviation of the field's direction")] = math.radians(
-        1.0
-    )
-    nadir: Annotated[float, Parameter("rad", above=0.0, text="assumed deviation of the nadir")] = math.radians(0.5)
+    sun: Annotated[float, Parameter("rad", above=0.0, text="assumed standard deviation")] = math.radians(0.5)
+    field: Annotated[float, Parameter("rad", above=0.0, text="assumed standard deviation")] = math.radians(1.0)
+    nadir: Annotated[float, Parameter("rad", above=0.0, text="assumed standard deviation")] = math.radians(0.5)
     apart: Annotated[float, APART] = math.radians(5.0)
     ephemeris: Annotated[int, EPHEMERIS] = 0
 
@@ -66,14 +64,14 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
-    # Of one in all they would be as good; so the largest is 1.
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
+    # Only ratios of weights matter; the largest is 1.
     least = min(params.sun, params.field, params.nadir)
     return Numbers(known_from(params, params.epoch, params.ephemeris, least), math.sin(params.apart) ** 2)
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
-    """The best attitude by the directions that are there, else by the gyro."""
+    """Return the best attitude from the available directions, else the one propagated by the gyro, and the new memory."""
 
     def observe(time: Scalar) -> tuple[Quaternion, Truth]:
         pairs = pairs_of(readings, time, params.known)
@@ -89,11 +87,11 @@ def _apart(one: Pair, other: Pair, sine_squared: Scalar) -> Truth:
 
 
 def best(pairs: list[Pair], clear: Truth) -> Quaternion:
-    """The attitude (inertial to body) with the least weighted sum of squares of what directions are off; no turn where it is
-    not clear.
+    """Return the attitude (inertial to body) with the least weighted sum of squared residuals of the directions; the
+    identity if it is not determined.
 
-    The matrix K has the trace 0. Newton's method comes down to its largest eigenvalue from the sum of the weights, above
-    which it has none; the eigenvector is a column of the adjugate of K - eigenvalue, the one that is longest."""
+    The matrix K has the trace 0. Newton's method descends to the largest eigenvalue from the sum of the weights, an upper
+    bound; the eigenvector is the longest column of the adjugate of K - eigenvalue."""
     weights = [where(there, weight, 0.0) for _, _, weight, there in pairs]
     columns = [scale(w, seen) for w, (seen, _, _, _) in zip(weights, pairs, strict=True)]
     b: Any = [[sum(c[i] * pair[1][j] for c, pair in zip(columns, pairs, strict=True)) for j in range(3)] for i in range(3)]
@@ -117,12 +115,12 @@ def best(pairs: list[Pair], clear: Truth) -> Quaternion:
 
 
 UNTURNED = ((1.0, 0.0, 0.0, 0.0), (0.0, -1.0 / 3.0, 0.0, 0.0), (0.0, 0.0, -1.0 / 3.0, 0.0), (0.0, 0.0, 0.0, -1.0 / 3.0))
-"""The matrix of three orthogonal directions without a turn."""
+"""The matrix K of three orthogonal directions at the identity attitude."""
 
 
 def _characteristic(k: Any) -> Vector:
-    """The coefficients of the square, of the number and of 1 in the characteristic polynomial of a symmetric matrix of trace
-    0."""
+    """Return the coefficients of the quadratic, linear and constant terms of the characteristic polynomial of a symmetric
+    4x4 matrix of trace 0."""
     minors = sum(k[i][i] * k[j][j] - k[i][j] * k[i][j] for i, j in combinations(range(4), 2))
     thirds = sum(_cofactor(k, i, i) for i in range(4))
     last = sum(k[0][j] * _cofactor(k, 0, j) for j in range(4))
@@ -136,5 +134,5 @@ def _cofactor(rows: Any, i: int, j: int) -> Scalar:
 
 
 def examples() -> list[Params]:
-    """The default epoch, and another one with a good Sun sensor."""
+    """Return the default epoch, and another one with a good Sun sensor."""
     return [Params(), Params((2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), math.radians(0.05), apart=math.radians(20.0))]

@@ -1,5 +1,5 @@
-"""Attitude from the Sun and the magnetic field, as measured and as computed for the place and time; the gyro carries it on
-where one of them is missing."""
+"""Attitude from the measured directions of the Sun and the magnetic field and those computed for position and time; the
+gyro propagates it while one of them is missing."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ remember = attitude_at_start
 
 
 class Params(NamedTuple):
-    """When the flight begins, and how near to each other the two directions may be."""
+    """The epoch, and the least angle between the two directions."""
 
     epoch: Annotated[Date, EPOCH] = START
     apart: Annotated[float, APART] = math.radians(5.0)
@@ -58,13 +58,13 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
     light = sun.prepared(params.epoch, params.ephemeris)
     return Numbers(light, magnetic_field.prepared(params.epoch), math.sin(params.apart) ** 2)
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
-    """The attitude by both directions where they are there, else by the gyro."""
+    """Return the attitude from both directions if available, else the one propagated by the gyro, and the new memory."""
 
     def observe(time: Scalar) -> tuple[Quaternion, Truth]:
         there = both(less(0.5, readings.sun_is_seen), less(0.5, getattr(readings, "magnetic_field_is_new", 1.0)))
@@ -73,15 +73,15 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
             sun.sun(time, params.sun).direction, magnetic_field.field(readings.position, time, params.field), 0.0
         )
         usable = both(there, clear)
-        # An unusable measurement is replaced by something finite.
+        # An unusable measurement is replaced by finite numbers.
         return to_quaternion(chosen(usable, product(axes, transpose(reference)), IDENTITY)), usable
 
     return measured_or_carried(readings, memory, period, observe)
 
 
 def triad(first: Vector, second: Vector, sine_squared: Scalar) -> tuple[Matrix, Truth]:
-    """Return three axes as columns, the first along the first vector (of unit length), the second across both; and whether
-    they are further apart than an angle of this squared sine."""
+    """Return three axes as columns, the first along the first vector (of unit length), the second perpendicular to both;
+    and whether the angle between them exceeds that of this squared sine."""
     across = cross(first, second)
     square = dot(across, across)
     clear = less(sine_squared * dot(second, second), square)
@@ -90,5 +90,5 @@ def triad(first: Vector, second: Vector, sine_squared: Scalar) -> tuple[Matrix, 
 
 
 def examples() -> list[Params]:
-    """The default epoch, and another one."""
+    """Return the default epoch, and another one."""
     return [Params(), Params((2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), math.radians(20.0))]

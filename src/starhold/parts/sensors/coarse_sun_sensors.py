@@ -1,4 +1,4 @@
-"""Coarse Sun sensors: photodiodes on faces of the craft, whose currents by the cosine law give the Sun's direction."""
+"""Coarse Sun sensors: photodiodes on faces of the craft, whose currents give the Sun's direction by the cosine law."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ CUBE: tuple[Row, ...] = (
     (0.0, 0.0, -1.0),
 )
 MOST = RANGE - 1
-"""Diodes at most, whose random numbers leave one for the jitter."""
+"""Most diodes: their random numbers leave one for the jitter."""
 FAINT = 1e-6
-"""The weight with which components that the currents do not determine are drawn to zero."""
+"""Regularisation weight that draws undetermined components to zero."""
 
 
 class Params(NamedTuple):
@@ -83,8 +83,8 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Unit normals, as flight software has them; the deviation, the albedo and the threshold; the Sun, the control period
-    (s), outage and interval (control steps); () or the axes of the mounting, and how late it is."""
+    """Unit normals as assumed by flight software; standard deviation, albedo and threshold; the Sun, the control period
+    (s), outage and interval (control steps); the axes of the mounting, () for none, and the delay."""
 
     normals: tuple[Vector, ...]
     noise: Scalar
@@ -98,15 +98,15 @@ class Numbers(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """The direction that the currents give, zero where all diodes are dark."""
+    """The direction from the currents, zero if all diodes are dark."""
 
-    sun: Annotated[Vector, Quantity("1", "direction by the currents, 0 if unseen, body axes", "axis")]
+    sun: Annotated[Vector, Quantity("1", "direction from the currents, 0 if unseen, body axes", "axis")]
     sun_is_seen: Annotated[float, Quantity("1", "1 where a diode is lit, else 0")]
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for faces without direction, too many of them, a bad epoch, a bad outage and too
-    long a delay."""
+    """Return the numbers of a flight. Raise ValueError for faces without direction, too many faces, a bad epoch, a bad
+    outage and too long a delay."""
     if not 0 < len(params.faces) <= MOST:
         raise ValueError(f"from 1 to {MOST} diodes are taken, not {len(params.faces)}")
     if not all(math.hypot(*face) > 0.0 for face in params.faces):
@@ -122,7 +122,7 @@ remember = as_built.see_start
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
-    """The direction by the currents of this control step."""
+    """Return the direction from the currents of this control step, and the memory."""
     state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, MOST)
     seen = sun.sun(number_of(step) * params.period, params.sun)
     up = unit(state.position)
@@ -151,11 +151,11 @@ def _current(
 
 
 def _weight(current: Scalar, threshold: Scalar) -> Scalar:
-    """A diode counts as its current is strong, so that light from the other side is only taken off."""
+    """Return a diode's weight, in proportion to its current, so that the Earth's light on the far side hardly matters."""
     return where(less(threshold, current), current, 0.0)
 
 
 def examples() -> list[Params]:
-    """Diodes on a cube in the Earth's light, and on a pyramid of four without noise."""
+    """Return diodes on a cube with the Earth's light, and on a pyramid of four without noise."""
     pyramid = tuple((x, y, 1.0) for x in (1.0, -1.0) for y in (1.0, -1.0))
     return [Params(CUBE, 0.01, 0.3), Params(pyramid, threshold=0.02, mounting_error=(0.0, 0.01, 0.0))]

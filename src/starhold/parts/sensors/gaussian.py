@@ -1,4 +1,4 @@
-"""Attitude and rate with independent Gaussian errors, new at each control step."""
+"""Attitude and rate with independent Gaussian errors, drawn at each control step."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Reading(NamedTuple):
 
 
 def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int) -> tuple[Reading, NoMemory]:
-    """Attitude turned by Gaussian angles about the body axes, rate with a Gaussian error."""
+    """Return the attitude turned by Gaussian angles about the body axes, and the rate with a Gaussian error."""
     # The vector part of a small rotation's quaternion is half the angle.
     d, turning = dice.vectors(0, 0.5 * params.attitude, params.rate)
     attitude = normalise(multiply(state.attitude, (1.0, d[0], d[1], d[2])))
@@ -44,15 +44,15 @@ def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int)
 
 
 def error(params: Params) -> Errors:
-    """None but the noise."""
+    """Return no errors besides noise."""
     return NO_ERRORS
 
 
 def noise(params: Params, period: float) -> Noise:
-    """The Gaussian angles and rates."""
+    """Return the noise of angles and rates."""
     return Noise(diagonal((params.attitude, params.attitude, params.attitude)), rate=params.rate)
 
 
 def examples() -> list[Params]:
-    """The published noise, and none."""
+    """Return the published noise, and zero noise."""
     return [Params(1e-3, 1e-4), Params(0.0, 0.0)]

@@ -1,4 +1,4 @@
-"""A receiver of satellite navigation: position and velocity with noise."""
+"""A satellite-navigation receiver: position and velocity with noise."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Deviations of position (m) and velocity (m/s), and how late the receiver is."""
+    """Standard deviations of position (m) and velocity (m/s), and the delay."""
 
     position: Scalar
     velocity: Scalar
@@ -47,17 +47,17 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for too long a delay."""
+    """Return the numbers of a flight. Raise ValueError for too long a delay."""
     return Numbers(params.position, params.velocity, as_built.late_by(params.delay, period, params.jitter))
 
 
 def remember(params: Numbers, state: Any) -> Any:
-    """The state at the start where it is late."""
+    """Return the initial memory: the initial state if the receiver is delayed."""
     return as_built.awaited(NoMemory(), params.late, state, SEEN)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
-    """Position and velocity at this control step, with noise."""
+    """Return position and velocity at this control step, with noise, and the memory."""
     state, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 6)
     away, faster = dice.vectors(0, params.position, params.velocity)
     reading = Reading(add(state.position, away), add(state.velocity, faster))
@@ -65,5 +65,5 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def examples() -> list[Params]:
-    """One of a CubeSat, an exact one, and one that is late."""
+    """Return one of a CubeSat, an exact one, and a delayed one."""
     return [Params(10.0, 0.1), Params(), Params(10.0, 0.1, 0.12, 1e-3)]

@@ -39,7 +39,7 @@ class Params(NamedTuple):
             also="rad/sqrt(s)",
             at_least=0.0,
             plain=(0.1, "deg/sqrt(h)"),
-            text="standard deviation of the mean over a second: the angle random walk",
+            text="standard deviation of the mean over 1 s: the angle random walk",
         ),
     ] = 0.0
     bias: Annotated[Vector, Parameter("rad/s", shape=(3,), spread=False, text="at the start")] = ZERO
@@ -50,7 +50,7 @@ class Params(NamedTuple):
             also="rad/s/sqrt(h)",
             at_least=0.0,
             plain=(0.1, "deg/h/sqrt(h)"),
-            text="standard deviation of the bias's change within an hour: the rate random walk",
+            text="standard deviation of the bias's change in 1 h: the rate random walk",
         ),
     ] = 0.0
     scale_error: Annotated[float, Parameter("1", at_least=-0.5, at_most=0.5, text="of the scale factor")] = 0.0
@@ -60,22 +60,20 @@ class Params(NamedTuple):
     resolution: Annotated[float, as_built.resolution("rad/s")] = 0.0
     bias_instability: Annotated[
         float,
-        Parameter(
-            "rad/s", at_least=0.0, plain=(0.1, "deg/h"), text="deviation of the part of the bias that wanders about zero"
-        ),
+        Parameter("rad/s", at_least=0.0, plain=(0.1, "deg/h"), text="standard deviation of the wandering part of the bias"),
     ] = 0.0
     correlation_time: Annotated[
         float,
-        Parameter("s", above=0.0, text="of that part: its Allan deviation is largest, 0.62 of it, at 1.9 of this time"),
+        Parameter("s", above=0.0, text="of that part: its Allan deviation has a maximum of 0.62 of it at 1.9 of this time"),
     ] = 100.0
     delay: Annotated[float, as_built.DELAY] = 0.0
     jitter: Annotated[float, as_built.JITTER] = 0.0
 
 
 class Numbers(NamedTuple):
-    """Deviations of a reading and of the bias's step (rad/s), the bias at the start, the scale factor and the limit; () or
-    its axes, its step (rad/s), of the part of the bias that wanders the share that stays and the deviation of what is
-    added (rad/s), and how late it is."""
+    """Standard deviations of a reading and of the bias's step (rad/s), the initial bias, the scale factor and the limit;
+    each () for none: its axes, its resolution (rad/s), the decay factor and the standard deviation of the step (rad/s) of
+    the wandering bias, and the delay."""
 
     deviation: Scalar
     walk: Scalar
@@ -89,20 +87,20 @@ class Numbers(NamedTuple):
 
 
 class Wandering(NamedTuple):
-    """The bias of a control step without the part that wanders, and that part (rad/s)."""
+    """The bias of a control step without the wandering part, and that part (rad/s)."""
 
     bias: Vector
     wander: Vector
 
 
 class Reading(NamedTuple):
-    """The rate that it shows."""
+    """The measured rate."""
 
     rate: Annotated[Vector, Quantity("rad/s", "angular velocity as the gyro measures it, body axes", "axis")]
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step. ValueError for too long a delay."""
+    """Return the numbers of a control step. Raise ValueError for too long a delay."""
     walk = params.bias_walk * math.sqrt(period / HOUR)
     stays, size = math.exp(-period / params.correlation_time), params.bias_instability
     return Numbers(
@@ -119,12 +117,12 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def remember(params: Numbers, state: Any) -> Any:
-    """The bias at the start (rad/s), and the rate then where it is late."""
+    """Return the initial memory: the bias (rad/s), and the rate if the gyro is delayed."""
     return as_built.awaited(Wandering(params.bias, ZERO) if params.wander else params.bias, params.late, state, SEEN)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
-    """The rate with the bias and noise of this control step, and the bias of the next."""
+    """Return the rate with the bias and noise of this control step, and the memory with the bias of the next."""
     state, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 9)
     bias = add(memory.bias, memory.wander) if params.wander else memory
     seen = as_built.along(params.axes, state.rate)
@@ -138,7 +136,8 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """The bias at the start and half a step; what grows with the rate, wanders or comes late has no bound."""
+    """Return the initial bias and half a step of the resolution as a bound; errors that grow with the rate, wander or are
+    due to delay have no bound."""
     built = as_built.is_given(params.scale_error, params.mounting_error, params.axis_errors, params.bias_instability)
     built = built or as_built.is_given(params.delay, params.jitter)
     if built or params.limit < math.inf:
@@ -148,13 +147,13 @@ def error(params: Params) -> Errors:
 
 
 def noise(params: Params, period: float) -> Noise:
-    """The noise of a reading, and the walk of the bias."""
+    """Return the noise of a reading, and the walk of the bias."""
     numbers = prepare(params, period)
     return Noise(rate=numbers.deviation, walk=numbers.walk)
 
 
 def examples() -> list[Params]:
-    """A MEMS gyro, one that has a bias alone, one that is exact, and one with errors of manufacture, a delay and jitter."""
+    """Return a MEMS gyro, one with only a bias, an exact one, and one with errors of manufacture, a delay and jitter."""
     mems = Params(noise=math.radians(0.15) / 60.0, bias=(1e-4, -2e-4, 5e-5), bias_walk=math.radians(3.0) / HOUR)
     skewed = ((1e-3, 0.0, 5e-4), (0.0, -2e-3, 0.0), (0.0, 3e-4, 0.0))
     built = mems._replace(

@@ -42,7 +42,7 @@ class Params(NamedTuple):
     half_angle: Annotated[
         float, Parameter("rad", above=0.0, at_most=math.pi, text="of the field of view; half a turn scans all around")
     ] = math.pi
-    limb_height: Annotated[float, Parameter("m", text="of the limb above that which flight software supposes")] = 0.0
+    limb_height: Annotated[float, Parameter("m", text="of the limb above the height that flight software assumes")] = 0.0
     outage: Annotated[Window, OUTAGE] = NEVER
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
     jitter: Annotated[float, as_built.JITTER] = 0.0
@@ -51,8 +51,8 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the limb's height
-    (m), outage and interval (control steps); () or the axes of the mounting, and how late it is."""
+    """The standard deviation (rad), the unit vector of the boresight, the cosine of the field of view's half angle, the
+    limb's height (m), outage and interval (control steps); the axes of the mounting, () for none, and the delay."""
 
     noise: Scalar
     boresight: Vector
@@ -64,14 +64,14 @@ class Numbers(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """The direction that it shows, zero where it sees no limb."""
+    """The measured direction, zero if it sees no limb."""
 
     nadir: Annotated[Vector, Quantity("1", "direction of the Earth's centre, 0 if unseen, body axes", "axis")]
     nadir_is_seen: Annotated[float, Quantity("1", "1 where the sensor sees the limb, else 0")]
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for a boresight without direction, a bad outage and too long a delay."""
+    """Return the numbers of a flight. Raise ValueError for a zero boresight, a bad outage and too long a delay."""
     return Numbers(
         params.noise,
         unit_boresight(params.boresight),
@@ -87,14 +87,14 @@ remember = as_built.see_start
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
-    """The direction of the Earth's centre at this control step."""
+    """Return the direction of the Earth's centre at this control step, and the memory."""
     state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 3)
     distance = norm(state.position)
     down = as_built.along(params.axes, to_body(state.attitude, scale(-1.0 / distance, state.position)))
     toward = dot(down, params.boresight)
     beside = add(params.boresight, scale(-toward, down))
     across = sqrt(maximum(dot(beside, beside), TINY))
-    # Sine and cosine of the limb's angle from the centre, and of the boresight's from the limb.
+    # Sine and cosine of the limb's angle from the centre, and the boresight's angle from the limb.
     sine = RADIUS / distance
     cosine = sqrt(maximum(1.0 - sine * sine, TINY))
     within = less(params.cosine, toward * cosine + across * sine)
@@ -106,7 +106,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def examples() -> list[Params]:
-    """One with a narrow field at the limb of low orbits, and one that scans all around."""
+    """Return one with a narrow field at the limb of low orbits, and one that scans all around."""
     return [
         Params(math.radians(0.2), (0.0, 0.9, 0.45), math.radians(20.0), 5e3),
         Params(outage=(0.5, 1.0), mounting_error=(0.0, 0.01, 0.0)),

@@ -56,8 +56,8 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Deviation and bias (T), the scale factor, the field, and outage and interval (control steps); () or its axes, its step
-    (T), its limit (T), and how late it is."""
+    """Standard deviation and bias (T), the scale factor, the field, and outage and interval (control steps); its axes and
+    its resolution (T), () for none, its limit (T), and the delay."""
 
     noise: Scalar
     bias: Vector
@@ -78,8 +78,8 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known, for a bad outage and too long a
-    delay."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known, for a bad outage and
+    too long a delay."""
     field, outage = magnetic_field.prepared(params.epoch, period), in_steps(params.outage, period, params.interval)
     return Numbers(
         _deviation(params, period),
@@ -95,12 +95,12 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def remember(params: Numbers, state: Any) -> Any:
-    """No reading yet (T), and the state at the start where it is late."""
+    """Return the initial memory: a zero reading (T), and the initial state if the sensor is delayed."""
     return as_built.awaited(ZERO, params.late, state, as_built.PLACE)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
-    """The field at this control step, or in an outage the last one before it."""
+    """Return the field at this control step, or in an outage the last one before it, and the memory."""
     state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 3)
     true = magnetic_field.field_at(state.position, step, params.field)
     seen = as_built.along(params.axes, to_body(state.attitude, true))
@@ -113,7 +113,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """The largest error besides noise of a reading that is always new, wherever there is no ground."""
+    """Return the largest error besides noise of a reading that is always new, anywhere above ground."""
     late = as_built.is_given(params.interval, params.jitter, params.delay)
     if params.outage != NEVER or params.limit < math.inf or late:
         return UNBOUNDED
@@ -124,12 +124,12 @@ def error(params: Params) -> Errors:
 
 
 def noise(params: Params, period: float) -> Noise:
-    """Tell the noise of a reading."""
+    """Return the noise of a reading."""
     return Noise(field=_deviation(params, period))
 
 
 def _deviation(params: Params, period: float) -> Scalar:
-    """The standard deviation of each component of a reading (T)."""
+    """Return the standard deviation of each component of a reading (T)."""
     return sqrt(params.noise * params.noise + params.noise_density * params.noise_density * (0.5 / period))
 
 

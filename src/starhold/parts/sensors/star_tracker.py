@@ -1,4 +1,4 @@
-"""A star tracker: attitude with noise as a rotation, at a rate of its own and late."""
+"""A star tracker: the attitude with a noise rotation, at its own update rate and with a delay."""
 
 from __future__ import annotations
 
@@ -67,8 +67,9 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Deviations (rad), the unit vector of the boresight, control steps from update to update, how late it is, and control
-    steps of the outage; the cones that blind, the squared rate limit (rad2/s2) and the turn of its mounting, () for none."""
+    """Standard deviations (rad), unit vector of the boresight, control steps from update to update, delay, and control
+    steps of the outage; the blinding cones, the squared rate limit (rad2/s2) and the rotation of its mounting, () for
+    none."""
 
     cross: Scalar
     roll: Scalar
@@ -89,7 +90,7 @@ class Memory(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """The attitude that it shows, and whether it is a new one (1) or that of an earlier control step (0)."""
+    """The measured attitude, and whether it is new (1) or from an earlier control step (0)."""
 
     attitude: Annotated[
         Quaternion, Quantity("1", "attitude as the star tracker measures it, inertial to body, scalar first", "quaternion")
@@ -98,8 +99,8 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step. ValueError for a boresight without direction, too long a delay, a bad outage,
-    and cones that blind always."""
+    """Return the numbers of a control step. Raise ValueError for a boresight without direction, too long a delay, a bad
+    outage, and cones that always blind."""
     boresight, mounted = unit_boresight(params.boresight), as_built.turn_of(params.mounting_error)
     looks = to_reference(mounted, boresight) if mounted else boresight
     return Numbers(
@@ -118,17 +119,18 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def check_start(params: Numbers, start: Any, craft: Craft) -> None:
-    """Raise ValueError where cones have no orbit, or blind always."""
+    """Raise ValueError if cones have no orbit, or always blind."""
     blinding.check(params.cones, start, craft)
 
 
 def remember(params: Numbers, state: Any) -> Any:
-    """An update is due, and the attitude at the start is on its way. Until it comes the inertial axes are shown."""
+    """Return the initial memory: an update is due. Until the delayed initial attitude arrives, readings are the inertial
+    axes."""
     return as_built.awaited(Memory(NO_TURN, 0.0), params.late, state, SEEN)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
-    """The last update, a new one where it is due."""
+    """Return the last update, or a new one if it is due, and the memory."""
     then, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 3)
     seen = then.attitude
     due = both(less(memory.left, 0.5), opposite(is_out(step, params.outage)))
@@ -150,7 +152,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """The mounting error, if attitudes are not delayed; the rotation of the craft during a delay has no bound."""
+    """Return the mounting error if attitudes are not delayed; the craft's rotation during a delay has no bound."""
     silent = params.outage != NEVER or params.sun_cone or params.moon_cone or any(params.limb_cones)
     if params.delay or as_built.is_given(params.jitter) or silent or params.rate_limit < math.inf:
         return UNBOUNDED
@@ -158,13 +160,13 @@ def error(params: Params) -> Errors:
 
 
 def noise(params: Params, period: float) -> Noise:
-    """The angles across the boresight and about it."""
+    """Return the noise of the angles across the boresight and about it."""
     numbers = prepare(params, period)
     return Noise(along_axis(numbers.boresight, numbers.roll, numbers.cross), int(numbers.every))
 
 
 def examples() -> list[Params]:
-    """A small one at four readings a second, one that is exact but askew, and one with cones."""
+    """Return a small one at four readings per second, one that is exact but misaligned, and one with cones."""
     arcsec = math.radians(1.0 / 3600.0)
     sun, moon, lit, dark = (math.radians(angle) for angle in (40.0, 10.0, 30.0, 5.0))
     blinded = Params(1e-5, 1e-4, (0.0, 0.0, -1.0), 0.2, 0.0, NEVER, sun, moon, (lit, dark), math.radians(3.0))

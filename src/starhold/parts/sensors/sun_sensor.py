@@ -1,4 +1,4 @@
-"""A sun sensor: the Sun's direction, where it is in the field of view and the Earth does not hide it."""
+"""A Sun sensor: the Sun's direction, if it is in the field of view and the Earth does not hide it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Params(NamedTuple):
     boresight: Annotated[Vector, BORESIGHT] = THIRD
     half_angle: Annotated[
         float,
-        Parameter("rad", above=0.0, at_most=math.pi, text="of the field of view, from the boresight; half a turn sees all"),
+        Parameter("rad", above=0.0, at_most=math.pi, text="of the field of view; half a turn sees all"),
     ] = math.pi
     epoch: Annotated[Date, EPOCH] = START
     outage: Annotated[Window, OUTAGE] = NEVER
@@ -54,8 +54,8 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the Sun, the control
-    period (s), and outage and interval (control steps); () or its axes, and how late it is."""
+    """The standard deviation (rad), the unit vector of the boresight, the cosine of the field of view's half angle, the
+    Sun, the control period (s), and outage and interval (control steps); its axes, () for none, and the delay."""
 
     noise: Scalar
     boresight: Vector
@@ -68,15 +68,15 @@ class Numbers(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """The direction that it shows, zero where it does not see the Sun."""
+    """The measured direction, zero if it does not see the Sun."""
 
     sun: Annotated[Vector, Quantity("1", "direction as measured, 0 if unseen, body axes", "axis")]
     sun_is_seen: Annotated[float, Quantity("1", "1 where the sensor sees the Sun, else 0")]
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for a boresight without direction, a bad epoch, a bad outage and too long a
-    delay."""
+    """Return the numbers of a flight. Raise ValueError for a boresight without direction, a bad epoch, a bad outage and too
+    long a delay."""
     cosine = field_cosine(params.half_angle)
     outage = in_steps(params.outage, period, params.interval)
     axes = as_built.axes_of(params.mounting_error, ZERO)
@@ -97,21 +97,21 @@ remember = as_built.see_start
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
-    """The Sun at this control step."""
+    """Return the Sun's direction at this control step, and the memory."""
     state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 3)
     seen = sun.sun(number_of(step) * params.period, params.sun)
     toward = as_built.along(params.axes, to_body(state.attitude, seen.direction))
     inside = less_equal(params.cosine, dot(toward, params.boresight))
     lit = less(0.5, sun.in_view(state.position, seen))
     visible = both(both(inside, lit), opposite(is_out(step, params.outage)))
-    # Along the direction itself the noise has no effect.
+    # Noise along the direction itself has no effect.
     shown = unit(add(toward, dice.vector(0, params.noise)))
     reading: Any = tuple(where(visible, x, 0.0) for x in shown)
     return Reading(reading, where(visible, 1.0, 0.0)), as_built.kept(memory, waiting)
 
 
 def examples() -> list[Params]:
-    """A fine one, and one without noise that sees all and is mounted askew."""
+    """Return a fine one, and one without noise that sees all directions and is misaligned."""
     return [
         Params(math.radians(0.1), (1.0, 0.0, 1.0), math.radians(60.0)),
         Params(epoch=(2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), mounting_error=(0.01, 0.0, -0.02)),

@@ -1,7 +1,7 @@
-"""Turns about a fixed axis, from rest to rest, at a limited acceleration and rate; paths of one or two of them, which keep
-an axis of the body away from the Sun.
+"""Turns about a fixed axis, from rest to rest, at a limited acceleration and rate; paths of one or two such turns that keep
+a body axis away from the Sun.
 
-A path is relative to where it leads, which may move. It begins at an attitude relative to that, and its turns end there."""
+A path is relative to its end, which may move: it begins at an attitude relative to the end, and its turns lead there."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ AXIS = Parameter("1", shape=(3,), spread=False, text="body axis that keeps away 
 KEEP_OUT = Parameter("rad", at_least=0.0, at_most=math.pi, text="angle to the Sun that it keeps; none if 0")
 """The declarations of a slew's limits."""
 DETOURS = (0.03, 0.1, 0.2, 0.35, 0.5)
-"""How far from the cone's edge to the point opposite the Sun a detour may lead; the first that stays clear is taken."""
+"""Detours past the cone's edge, as shares of the way to the point opposite the Sun; the first that stays clear is used."""
 TINY = 1e-12
 
 
 class Leg(NamedTuple):
-    """A turn: its axis, for how long it accelerates and then coasts (s), and the acceleration (rad/s2)."""
+    """A turn: its axis, the times of acceleration and of coasting (s), and the acceleration (rad/s2)."""
 
     axis: Vector
     speeding: Scalar
@@ -47,8 +47,8 @@ class Leg(NamedTuple):
 
 
 class Cone(NamedTuple):
-    """A cone about the Sun: the body axis that stays out of it, the cosine of the angle that this keeps, and the cosines and
-    sines of the angles to the Sun at which a detour leads past it."""
+    """A keep-out cone about the Sun: the body axis that stays out of it, the cosine of its half angle, and the cosines and
+    sines of the angles to the Sun at which detours pass it."""
 
     axis: Vector
     cosine: Scalar
@@ -56,7 +56,7 @@ class Cone(NamedTuple):
 
 
 def cone_of(axis: Vector, keep_out: float) -> Cone | tuple[()]:
-    """The cone of an axis and an angle (rad), () for none. ValueError for an axis without a direction."""
+    """Return the cone of an axis and an angle (rad), () for none. Raise ValueError for an axis without direction."""
     if not keep_out:
         return ()
     if not norm(axis) > 0.0:
@@ -66,7 +66,7 @@ def cone_of(axis: Vector, keep_out: float) -> Cone | tuple[()]:
 
 
 def leg_of(turn: Quaternion, rate: Scalar, acceleration: Scalar) -> Leg:
-    """The leg of a turn, the shorter way."""
+    """Return the leg of a turn, the shorter way."""
     vector = rotation_vector(turn)
     angle = norm(vector)
     speeding = minimum(rate / acceleration, sqrt(maximum(angle, TINY) / acceleration))
@@ -75,7 +75,7 @@ def leg_of(turn: Quaternion, rate: Scalar, acceleration: Scalar) -> Leg:
 
 
 def torque_of(leg: Leg, inertia: Any) -> Scalar:
-    """The largest torque (N m) about a body axis that a leg takes of a rigid body."""
+    """Return the largest torque (N m) about a body axis that a leg needs on a rigid body."""
     along, across = _loads(leg.axis, inertia)
     rate = leg.acceleration * leg.speeding
     a, b, c = (leg.acceleration * x + rate * rate * y for x, y in zip(along, across, strict=True))
@@ -83,8 +83,8 @@ def torque_of(leg: Leg, inertia: Any) -> Scalar:
 
 
 def within(turn: Quaternion, rate: Scalar, acceleration: Scalar, torque: Scalar, inertia: Any) -> Leg:
-    """The leg of a turn with the limits of rate and acceleration that a limit of the torque (N m) about each body axis
-    leaves for its axis: at most half of it is the gyroscopic torque."""
+    """Return the leg of a turn with rate and acceleration reduced to keep a torque limit (N m) about each body axis, of
+    which the gyroscopic torque takes at most half."""
     along, across = _loads(leg_of(turn, rate, acceleration).axis, inertia)
     rate = minimum(rate, sqrt(0.5 * torque / maximum(most(across), TINY)))
     for x, y in zip(along, across, strict=True):
@@ -93,14 +93,14 @@ def within(turn: Quaternion, rate: Scalar, acceleration: Scalar, torque: Scalar,
 
 
 def _loads(axis: Vector, inertia: Any) -> tuple[Vector, Vector]:
-    """The sizes of the torques (N m) about the body axes for 1 rad/s2, and at 1 rad/s, about an axis."""
+    """Return the absolute torques (N m) about the body axes for 1 rad/s2, and at 1 rad/s, about an axis."""
     momentum = apply(inertia, axis)
     (a, b, c), (x, y, z) = momentum, cross(axis, momentum)
     return (absolute(a), absolute(b), absolute(c)), (absolute(x), absolute(y), absolute(z))
 
 
 def turned(start: Quaternion, legs: tuple[Leg, ...], time: Scalar) -> Goal:
-    """The attitude on a path at a time (s) after it began, with its rate and acceleration in its own axes."""
+    """Return the goal on a path at a time (s) after its begin, with rate and acceleration in its own axes."""
     attitude, rate, slope = start, ZERO, ZERO
     for leg in legs:
         up, flat, a = leg.speeding, leg.coasting, leg.acceleration
@@ -121,7 +121,7 @@ def _clipped(time: Scalar, longest: Scalar) -> Scalar:
 
 
 def onto(goal: Goal, path: Goal, before: Quaternion) -> Goal:
-    """The goal on a path relative to another one that moves; of its two quaternions the one nearer to `before`."""
+    """Return the goal on a path relative to a moving goal; of its two quaternions, the one nearer to `before`."""
     carried, pushed = to_body(path.attitude, goal.rate), to_body(path.attitude, goal.acceleration)
     acceleration = add(add(pushed, path.acceleration), cross(carried, path.rate))
     return Goal(nearer(multiply(goal.attitude, path.attitude), before), add(carried, path.rate), acceleration)
@@ -130,8 +130,8 @@ def onto(goal: Goal, path: Goal, before: Quaternion) -> Goal:
 def turns_of(
     start: Quaternion, end: Quaternion, cone: Cone | tuple[()], seen: Vector
 ) -> tuple[tuple[Quaternion, ...], Scalar]:
-    """The turns of a path from an attitude to another: one, with a cone two, of which the second is none where the first
-    alone stays out of it; and the cosine of the least angle to the Sun on the way, whose direction is `seen`."""
+    """Return the turns of a path between two attitudes, one, or with a cone two, the second zero if the first alone stays
+    out of the cone; and the cosine of the least angle to the Sun, whose direction is `seen`, on the way."""
     direct = _short(relative(start, end))
     if not cone:
         return (direct,), -1.0
@@ -139,7 +139,7 @@ def turns_of(
     halfway = multiply(start, normalise((1.0 + direct[0], *vector_part(direct))))
     middle = to_reference(halfway, cone.axis)
     away = subtract(middle, scale(dot(middle, seen), seen))
-    # A path through the Sun itself may leave it to any side.
+    # A path through the Sun itself may be moved to either side.
     other = cross(seen, to_reference(start, cone.axis))
     away = chosen(less(norm(away), 1e-6), other, away)
     away = scale(1.0 / maximum(norm(away), TINY), away)
@@ -162,7 +162,7 @@ def _short(turn: Quaternion) -> Quaternion:
 
 
 def nearest_cosine(start: Quaternion, turn: Quaternion, axis: Vector, seen: Vector) -> Scalar:
-    """The cosine of the least angle between a body axis and a direction on a turn of at most 180 deg."""
+    """Return the cosine of the least angle between a body axis and a direction on a turn of at most 180 deg."""
     size = norm(vector_part(turn))
     begun, about = to_reference(start, axis), to_reference(start, scale(1.0 / maximum(size, TINY), vector_part(turn)))
     # After a turn by x it is along + c cos x + s sin x.

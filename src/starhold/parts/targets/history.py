@@ -1,4 +1,4 @@
-"""An attitude over time, through a smooth curve between given ones."""
+"""An attitude over time, on a smooth curve through given attitudes."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ ROLE = "target"
 TABLE = "target"
 
 HALF_TURN, SWING = 1e-6, 10.0
-"""How near to a half turn, as the cosine of half of it, neighbours in a history may be, and how far (rad) the spline may
-swing between them."""
+"""The least cosine of half the turn between neighbours in a history, which excludes half turns, and the largest swing (rad)
+of the spline between them."""
 
 
 class Knots(NamedTuple):
-    """The numbers of a rotation spline: times (n,) in s, attitudes (n, 4) and rates (n, 3; rad/s, target axes) at them. From
-    a knot to the next the rotation vector is the cubic in time that has the attitudes and rates of both."""
+    """The numbers of a rotation spline: times (n,) in s, attitudes (n, 4) and rates (n, 3; rad/s, target axes) at them.
+    Between knots the rotation vector is the cubic in time that matches the attitudes and rates of both."""
 
     times: NDArray[np.float64]
     attitudes: NDArray[np.float64]
@@ -36,26 +36,26 @@ class Knots(NamedTuple):
 
 
 class Params(NamedTuple):
-    """A table of `tabulate` with a row for each control step and one more, and the knots of the spline that it was taken
-    from (() for a table that comes without)."""
+    """A table of `tabulate` with a row for each control step and one more, and the knots of its spline (() if not
+    known)."""
 
     table: NDArray[np.float64]
     knots: Knots | tuple[()] = ()
 
 
 def prepare(params: Params, period: float) -> Buffer:
-    """The table as kernels read it."""
+    """Return the table as kernels read it."""
     return Buffer(params.table.ravel().tolist())
 
 
 def goal(params: Buffer, state: Any, step: int, before: Any) -> Goal:
-    """The row of this control step."""
+    """Return the row of this control step."""
     row: Any = params.row(step, 10)
     return Goal(row[:4], row[4:7], row[7:])
 
 
 def examples() -> list[Params]:
-    """A slow rotation about a slanted axis."""
+    """Return a slow rotation about an inclined axis."""
     times = np.linspace(0.0, 100.0, 11)
     half = 0.01 * times
     attitudes = np.stack([np.cos(half), 0.6 * np.sin(half), 0.0 * half, 0.8 * np.sin(half)], axis=1)
@@ -63,11 +63,11 @@ def examples() -> list[Params]:
 
 
 def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float64]:
-    """Rows (attitude, rate, acceleration) at the sample times, through a twice differentiable rotation spline.
+    """Return rows (attitude, rate, acceleration) at the sample times, from a twice differentiable rotation spline.
 
-    times: (n,) s, increasing; attitudes: (n, 4) quaternions, scalar first; sample times within [times[0], times[-1]].
-    Raises ValueError when they are not, where neighbours leave open which way the turn between them goes, and where the
-    spline swings far off between them. Target axes are the body axes to be followed."""
+    times: (n,) s, increasing; attitudes: (n, 4) quaternions, scalar first; sample times within [times[0], times[-1]]. Raise
+    ValueError if they are not, if the direction of the turn between neighbours is ambiguous, or if the spline swings far
+    off between them. Target axes are the desired body axes."""
     times, samples = np.asarray(times, dtype=float), np.asarray(sample_times, dtype=float)
     first, last = samples.min(), samples.max()
     if not (times[0] <= first and last <= times[-1]):
@@ -81,7 +81,7 @@ def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float6
 
 
 def knots_of(times: Any, attitudes: Any, last: float) -> Knots:
-    """The knots of the spline of `tabulate` that a run from 0 to `last` (s) needs. Raises ValueError as that does."""
+    """Return the knots of the spline of `tabulate` that a run from 0 to `last` (s) needs. Errors as in `tabulate`."""
     times, attitudes = np.asarray(times, dtype=float), np.asarray(attitudes, dtype=float)
     rates: NDArray[np.float64] = _spline(times, attitudes)(times, 1)
     first, end = np.searchsorted(times, 0.0, "right") - 1, np.searchsorted(times, last, "left") + 1
@@ -89,11 +89,11 @@ def knots_of(times: Any, attitudes: Any, last: float) -> Knots:
 
 
 def _spline(times: NDArray[np.float64], attitudes: NDArray[np.float64]) -> Any:
-    """The spline; ValueError where neighbours leave open which way the turn between them goes, or it swings far off."""
+    """Return the spline. Raise ValueError if the turn between neighbours is ambiguous, or the spline swings far off."""
     # Loaded here because few runs need it, and by name because its types are too loose for a strict checker.
     transform: Any = import_module("scipy.spatial.transform")
     unclear = np.abs(np.sum(attitudes[1:] * attitudes[:-1], axis=1)) < HALF_TURN
-    # Its iteration may fail where turns are large and times far from even.
+    # Its iteration may fail for large turns at very uneven times.
     with np.errstate(all="ignore"):
         spline = transform.RotationSpline(times, transform.Rotation.from_quat(attitudes, scalar_first=True))
         speeds = np.linalg.norm(spline(times, 1), axis=1)

@@ -22,7 +22,7 @@ class Params(NamedTuple):
 
 
 def goal(params: Params, state: Any, step: int, before: Any) -> Goal:
-    """The attitude, at rest."""
+    """Return the attitude, at rest."""
     return Goal(params.attitude, ZERO, ZERO)
 
 
@@ -32,5 +32,5 @@ def motion(params: Params, orbit: Orbit) -> Motion:
 
 
 def examples() -> list[Params]:
-    """The inertial axes, and others."""
+    """Return the inertial axes, and other axes."""
     return [Params(), Params((0.6, 0.0, 0.8, 0.0))]

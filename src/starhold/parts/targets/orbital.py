@@ -1,4 +1,5 @@
-"""The orbital frame: third axis to the centre of attraction, second against the orbit normal, first along the motion."""
+"""The orbital frame: third axis to the centre of attraction, second opposite to the orbit normal, first along the
+motion."""
 
 from __future__ import annotations
 
@@ -25,10 +26,10 @@ Params = NoParams
 
 
 def goal(params: NoParams, state: Any, step: int, before: Quaternion) -> Goal:
-    """The frame at this position and velocity.
+    """Return the frame at this position and velocity.
 
-    Its rate is h/r2 about the normal, and its acceleration -2 h (r.v)/r4, exact for two-body motion. Of the two quaternions
-    it gives the one nearer to `before`, so that a law that feeds back q never sees a jump."""
+    Its rate is h/r^2 about the normal, and its acceleration -2 h (r.v)/r^4, exact for two-body motion. Of its two
+    quaternions the one nearer to `before` is returned, so that a law that feeds back q sees no jump."""
     position, velocity = state.position, state.velocity
     h = cross(position, velocity)
     r2, h2 = dot(position, position), dot(h, h)
@@ -45,5 +46,5 @@ def motion(params: NoParams, orbit: Orbit) -> Motion:
 
 
 def examples() -> list[NoParams]:
-    """The one frame there is."""
+    """Return the only instance."""
     return [NoParams()]

@@ -28,13 +28,13 @@ FOLLOWS = True
 
 
 class Params(NamedTuple):
-    """How far the axis swings, how often, in what manner, and the body axes."""
+    """Amplitude, period and shape of the swings, and the body axes."""
 
     amplitude: Annotated[float, Parameter("rad", above=0.0, at_most=1.5, text="to either side of nadir")]
     swing: Annotated[float, Parameter("s", above=0.0, text="time from one side to the other and back")]
     shape: Annotated[int, Parameter(choices=("sinusoidal", "raster"), text="of the angle over time")] = 0
     turning: Annotated[
-        float, Parameter("1", above=0.0, at_most=1.0, text="share of a raster's time in which it turns round, evenly")
+        float, Parameter("1", above=0.0, at_most=1.0, text="share of a raster's time in which it reverses, evenly")
     ] = 0.2
     axis: Annotated[Vector, AXIS] = (0.0, 0.0, 1.0)
     other: Annotated[Vector, OTHER] = (0.0, 1.0, 0.0)
@@ -47,8 +47,8 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The amplitude (rad), swings in a second, the shape, the share in which it turns round, the triad of the body axes and
-    the axis of the swings, the gravitational parameter (m3/s2), and the control period (s)."""
+    """The amplitude (rad), swings per second, the shape, the share in which it reverses, the triad of the body axes and the
+    axis of the swings, the gravitational parameter (m3/s2), and the control period (s)."""
 
     amplitude: Scalar
     often: Scalar
@@ -61,7 +61,7 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for axes that leave the attitude open."""
+    """Return the numbers of a flight. Raise ValueError for axes that do not determine the attitude."""
     if not norm(params.about) > 0.0:
         raise ValueError("the axis that it swings about needs a direction")
     axes, about = body_axes(params.axis, params.other), scale(1.0 / norm(params.about), params.about)
@@ -70,8 +70,8 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
-    """The attitude at this control step: nadir, the second axis as near as it can against the orbit's normal, and a turn
-    from there."""
+    """Return the goal at this control step: nadir, with the second axis as near as possible to the negative orbit normal,
+    and a turn from there."""
     down = opposite_of(orbiting(state.position, state.velocity, params.gravity))
     against = scale(-1.0, cross(state.position, state.velocity))
     nadir = aligned(down, Moving(against, ZERO, ZERO), params.axes, before)
@@ -82,14 +82,14 @@ def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
 
 
 def _sine(params: Numbers, swings: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """The angle (rad), its rate and its acceleration of a sine after `swings` swings."""
+    """Return the angle (rad) of a sine after `swings` swings, its rate and its acceleration."""
     cosine, sine = cosine_sine(swings)
     often = math.tau * params.often
     return params.amplitude * sine, often * params.amplitude * cosine, -often * often * params.amplitude * sine
 
 
 def _raster(params: Numbers, swings: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """The angle (rad), its rate and its acceleration on straight lines, with a constant acceleration at their ends."""
+    """Return the angle (rad) on straight lines with constant acceleration at their ends, its rate and its acceleration."""
     phase = swings - nearest(swings)
     quarter = 0.25 - absolute(0.25 - absolute(phase))
     sense, towards = side(phase), side(0.25 - absolute(phase))
@@ -103,7 +103,7 @@ def _raster(params: Numbers, swings: Scalar) -> tuple[Scalar, Scalar, Scalar]:
 
 
 def _lines(amplitude: Scalar, turning: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """In swings: the time for which it turns round on one side of an end, the rate between, and the acceleration."""
+    """Return, with time in swings, half the time of a reversal, the rate between reversals, and the acceleration."""
     round_ = 0.25 * turning
     rate = amplitude / (0.25 - 0.5 * round_)
     return round_, rate, rate / round_
@@ -122,5 +122,5 @@ def motion(params: Params, orbit: Orbit) -> Motion:
 
 
 def examples() -> list[Params]:
-    """A sine across the motion, and a raster with other axes."""
+    """Return a sine across the motion, and a raster with other axes."""
     return [Params(0.3, 40.0), Params(0.1, 20.0, 1, 0.3, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 1.0))]

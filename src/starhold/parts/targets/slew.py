@@ -1,5 +1,5 @@
-"""A slew from rest to rest: the attitude turns about an axis at a limited acceleration and rate from one to another, or
-about two, one after the other, to lead an axis around the Sun."""
+"""A slew from rest to rest at limited acceleration and rate: one turn from an attitude to another, or two, one after the
+other, that lead an axis around the Sun."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ ROLE = "target"
 
 
 class Params(NamedTuple):
-    """Two attitudes, the limits of the slew between them, and a cone about the Sun that an axis keeps out of."""
+    """Two attitudes, the limits of the slew between them, and a keep-out cone about the Sun for an axis."""
 
     attitude: Annotated[Quaternion, Parameter("1", shape=(4,), spread=False, text="at the end, scalar first")]
     rate: Annotated[float, RATE]
@@ -63,8 +63,8 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The attitude before, the turns, when they begin (s), the largest torque about a body axis (N m), and the control
-    period (s)."""
+    """The attitude before, the turns, their begin (s), the largest torque about a body axis (N m), and the control period
+    (s)."""
 
     start: Quaternion
     legs: tuple[Leg, ...]
@@ -74,8 +74,8 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an attitude that is none, and where the axis begins or ends in the cone about
-    the Sun, or no path goes around that."""
+    """Return the numbers of a flight. Raise ValueError for an invalid attitude, and if the axis begins or ends in the cone
+    about the Sun, or no path goes around it."""
     start, end = unit_quaternion(params.start), unit_quaternion(params.attitude)
     seen, cone = (
         sun.sun(params.begin, sun.prepared(params.epoch, params.ephemeris)).direction,
@@ -102,14 +102,14 @@ def _kept(params: Params) -> str:
 
 
 def check(params: Numbers, craft: Craft) -> None:
-    """ValueError where the profile takes more torque than its limit about a body axis."""
+    """Raise ValueError if the profile needs more torque than its limit about a body axis."""
     most = max(torque_of(leg, craft.inertia) for leg in params.legs)
     if most > params.torque_limit:
         raise ValueError(f"the slew takes up to {most:.4g} N m about a body axis, more than {params.torque_limit:.4g} N m")
 
 
 def goal(params: Numbers, state: Any, step: int, before: Any) -> Goal:
-    """The attitude at this control step, with its rate and acceleration."""
+    """Return the goal at this control step."""
     return turned(params.start, params.legs, number_of(step) * params.period - params.begin)
 
 
@@ -120,7 +120,7 @@ def motion(params: Params, orbit: Orbit) -> Motion:
 
 
 def examples() -> list[Params]:
-    """Return a slew with a coast, and one without, which begins later and keeps away from the Sun."""
+    """Return a slew with coasting, and one without, which begins later and keeps away from the Sun."""
     wide = Params((0.0, 1.0, 1.0, 0.2), math.radians(0.5), math.radians(0.05), begin=20.0)
     short = Params((0.99, 0.1, 0.0, 0.05), 0.05, 2e-4, (1.0, 0.0, 0.1, 0.0), 10.0, axis=(0.0, 1.0, 0.0), keep_out=0.2)
     return [wide, short]

@@ -50,7 +50,7 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for axes that leave the attitude open, and for an epoch that is no date."""
+    """Return the numbers of a flight. Raise ValueError for axes that do not determine the attitude, or a bad epoch."""
     if not norm(params.reference) > 0.0:
         raise ValueError("the reference needs a direction")
     light = sun.prepared(params.epoch, params.ephemeris)
@@ -58,7 +58,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
-    """The attitude at this control step."""
+    """Return the goal at this control step."""
     seen = towards_sun(number_of(step) * params.period, params.sun)
     return aligned(seen, Moving(params.reference, ZERO, ZERO), params.axes, before)
 
@@ -76,5 +76,5 @@ def motion(params: Params, orbit: Orbit) -> Motion:
 
 
 def examples() -> list[Params]:
-    """The third axis at the Sun, and a slanted one at another time."""
+    """Return the third axis at the Sun, and an inclined axis at another time."""
     return [Params(), Params((0.0, 1.0, 1.0), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0))]
