@@ -214,6 +214,7 @@ ASSUMPTIONS = {
         "bounded-push",
         "held-torque",
         "late-torque",
+        "late-alike",
         "late-attitude",
         "late-rate",
         # The distribution of noise cannot be told from one flight.

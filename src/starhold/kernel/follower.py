@@ -133,6 +133,8 @@ class Follower(Reader):
     pull: list[Poly]
     bend: list[Poly]
     speeding: list[Poly]
+    slow: list[Poly]
+    soft: Fraction
     leant: Radii
     lates: list[Late]
 
@@ -144,7 +146,7 @@ class Follower(Reader):
             for kind in KINDS
             if f"late.{kind}.mean" in numbers
         ]
-        demand(all(one.kept < 1 and one.weight > 0 for one in lates), "what is late never comes")
+        demand(all(one.kept < 1 and min(one.weight, one.mean) > 0 for one in lates), "what is late never comes")
         self.step = plus(self.near.A, scalar(1, 6), -1)
         self.demanded = times(self.near.torque, self.step)
         least = [numbers.get(f"late.torque.{name}.least") for name in ("kept", "mean")] if lates else []
@@ -154,6 +156,7 @@ class Follower(Reader):
             demand(least[0] <= late.kept and least[1] <= late.mean, "a torque is late otherwise than it is")
             self.near, self.steady = steadied(self.near, self.h, late.kept, late.mean)
             self.inexact = late.kept - least[0], late.mean - least[1]
+            self.alike = least[1], least[0]
         # What the law's torque has beside that near its target.
         spun = [with_momentum(p - g) for p, g in zip(self.pull, self.bend, strict=True)] if lates else []
         self.gyrating = spun, minus(self.speeding, spun) if lates else []
@@ -245,7 +248,10 @@ class Follower(Reader):
                 # The linear part of the motion has what e does to it, up to what is not known of that.
                 e = tube.late
                 rest += self.inexact[0] * e.most + (off * self.inexact[1] + grown * late.mean) * ahead * e.most
-                rest += (steady.off[1] + curved) * h * ahead / 8 * late.mean * e.most
+                # What is curved is not in that part at all: e turns the body by up to h^2 / 2.
+                rest += (steady.off[1] + 4 * curved) * h * ahead / 8 * late.mean * e.most
+                # It is linear in x less where the slow torque holds the body, which moves by twice what it does in the mean.
+                rest += stretch([row[TURN] for row in steady.S]) * 2 * self.soft * self.stale(sizes, self.slow)
                 kept, behind = steady.kept, ZERO
             M = together([*rows, (grown, Aw), ((off + grown) * gyrating, w)], [near[x] for x in STATE])
             lates.append(Change(late, M, rest, kept + behind * share * late.mean, share))

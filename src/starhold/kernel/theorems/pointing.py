@@ -59,9 +59,11 @@ def points(claim: Claim) -> Proof:
         demand(not motion.behind(region.sizes, KINDS[1:]).most, "a plan is of what is told late")
         planned, torques = yield from motion.plan.keeps(region, (wrong["w"], wrong["q"]), as_told(region.sizes, wrong))
     off = motion.misread(region)[0] + motion.planned(region.sizes) + motion.behind(region.sizes, KINDS[1:]).most
-    if WITHIN in numbers:
+    behind_at_most = motion.behind(region.sizes, KINDS[:1]).most
+    if WITHIN in numbers or motion.steady is None:
         # Its components change one by one, not towards what is asked for.
-        off += (behind_at_most := motion.behind(region.sizes, KINDS[:1]).most)
+        off += behind_at_most
+    if WITHIN in numbers:
         yield "torque that follows", Exceeds(numbers[WITHIN], behind_at_most)
     limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques)
     if loop.signs:
@@ -133,6 +135,8 @@ def points(claim: Claim) -> Proof:
     text = bounded_motion(numbers, begun, "", misread)
     units = {"torque": ("N m", "torque that acts"), "attitude": ("", "attitude that it is told"), "rate": ("rad/s", "rate")}
     text += "".join(f", the {units[one.kind][1]} late, {one.in_words(units[one.kind][0])}" for one in motion.lates)
+    if motion.steady:
+        text += f", in all components alike, and by no less than {' and '.join(map(above, motion.alike))} times"
     text += f", at no time by {above(numbers[WITHIN])} N m" if WITHIN in numbers else ""
     text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
     text += f", with every J_ik off by up to {below(numbers['tolerance'])} sqrt(J_ii J_kk)" if motion.off else ""
@@ -148,6 +152,7 @@ def points(claim: Claim) -> Proof:
         *limited.assumptions,
     ]
     assumed += ["best-plan"] * bool(planned) + [f"late-{late.kind}" for late in motion.lates]
+    assumed += ["late-alike"] * (motion.steady is not None)
     assumed += loop.untold + ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
