@@ -12,7 +12,7 @@ from starhold.certification.assumptions import assumption
 from starhold.certification.evidence.finding import certificate
 from starhold.certification.proofs import pointed
 from starhold.certification.subject import make_subject
-from starhold.certification.unmodelled import lates, named
+from starhold.certification.unmodelled import late_torque, named
 from starhold.kernel.check import check
 from starhold.kernel.numbers import RefusedError
 from starhold.parts.catalogue import fit
@@ -88,9 +88,9 @@ def test_the_claim_of_another_lag_is_not_that_of_the_loop():
     slower = build(given, given.pick("lyapunov")).with_parts(fit("actuator", "lag", 0.06))
     plain = build(given, given.pick("lyapunov"))
     for other, same in ((loop, True), (slower, False), (plain, False)):
-        told = lates(other)
+        told = late_torque(other)
         numbers = claim.proof.claim["numbers"]
-        kept = told and Fraction(numbers["late.torque.kept"]) >= Fraction(told["torque"].kept)
+        kept = told and Fraction(numbers["late.torque.kept"]) >= Fraction(told.kept)
         assert bool(kept) == same
 
 

@@ -214,8 +214,6 @@ ASSUMPTIONS = {
         "bounded-push",
         "held-torque",
         "late-torque",
-        "late-attitude",
-        "late-rate",
         # The distribution of noise cannot be told from one flight.
         "gaussian-noise",
         "linear-estimate",
