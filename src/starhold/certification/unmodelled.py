@@ -225,7 +225,7 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
             f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope, f in estimated))
         ]
         share = band_of(loop).share
-        behind = [f"{LATE}{claim.numbers['late_torque']:.6g}"] if claim.numbers.get("late_torque") else []
+        behind = [f"{LATE}{claim.numbers['late_torque']!r}"] if claim.numbers.get("late_torque") else []
         return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []), *behind)
 
     target = motion_of(loop) or AT_REST
