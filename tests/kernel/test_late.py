@@ -1,22 +1,26 @@
 """Torque that lags or has a limit of its rate: claims with it, false ones, flights, and what each of its terms is for."""
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import starhold as sh
+from starhold.analysis.departure import first_off, start_inside
 from starhold.certification.assumptions import assumption
 from starhold.certification.evidence.finding import certificate
 from starhold.certification.proofs import pointed
 from starhold.certification.subject import make_subject
-from starhold.certification.unmodelled import lates, named
+from starhold.certification.unmodelled import late_torque, named
 from starhold.kernel.check import check
 from starhold.kernel.numbers import RefusedError
 from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
+from starhold.studies.compare import record
 from tests.certification.pointing_hunt import Attack
 from tests.tiers import leading
 
@@ -88,9 +92,9 @@ def test_the_claim_of_another_lag_is_not_that_of_the_loop():
     slower = build(given, given.pick("lyapunov")).with_parts(fit("actuator", "lag", 0.06))
     plain = build(given, given.pick("lyapunov"))
     for other, same in ((loop, True), (slower, False), (plain, False)):
-        told = lates(other)
+        told = late_torque(other)
         numbers = claim.proof.claim["numbers"]
-        kept = told and Fraction(numbers["late.torque.kept"]) >= Fraction(told["torque"].kept)
+        kept = told and Fraction(numbers["late.torque.kept"]) >= Fraction(told.kept)
         assert bool(kept) == same
 
 
@@ -104,3 +108,13 @@ def test_a_flight_that_begins_with_another_torque_leaves_the_claim():
         span = Span(torque=np.zeros((3, 3)), command=np.array([[off, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
         ((seen, _),) = unmet(span)
         assert bool(np.any(seen)) == where
+
+
+def test_a_loop_that_starts_with_a_torque_further_from_its_command_does_not_start_inside():
+    loop, claim, _ = flying("lag", 0.05)
+    off = first_off(loop)
+    run = record(sh.load("three-laws").with_({"spacecraft.actuator_lag": 0.05, "simulation.duration": 1.0}), loop)
+    assert np.isclose(off, np.linalg.norm(run["torque"][0] - run["command"][0]), rtol=1e-12)
+    for most, inside in ((1.001 * off, True), (0.999 * off, False)):
+        told = replace(claim, numbers=claim.numbers | {"late_torque": most, "start": 10.0, "momentum": 10.0})
+        assert start_inside(SimpleNamespace(claims=[told]), loop) == {"pointing": inside}

@@ -19,6 +19,7 @@ from starhold.certification.proofs import pointed
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes
 from starhold.kernel.check import check
+from starhold.kernel.follower import FIRST, REST
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account, RefusedError
@@ -85,7 +86,7 @@ class Lagging:
         region = self.held.region(Fraction(level))
         linear = self.held.steady_part(self.held.tube(region)) if steady else Fraction(0)
         return self.held.tube(
-            replace(region, sizes=region.sizes | {"|late torque": linear, "|late torque rest": Fraction(off)})
+            replace(region, sizes=region.sizes | {FIRST: linear, REST: Fraction(off)})
         )
 
     def lanes(self, tube, off, S):
@@ -103,7 +104,7 @@ class Lagging:
     def changed(self, level, off, steady):
         """The largest share that is used of how far a torque is off after a period."""
         tube = self.tube(level, off, steady)
-        (change,), S = self.held.changes_in(tube, steady), floats(self.held.steady.S) if steady else np.zeros((3, 6))
+        change, S = self.held.change_in(tube, steady), floats(self.held.steady.S) if steady else np.zeros((3, 6))
         x, f, e = self.lanes(tube, off, S)
         y, late = self.after(x, e)
         most = float(change.kept) * np.linalg.norm(f, axis=0) + np.linalg.norm(floats(change.M) @ x, axis=0)

@@ -215,8 +215,6 @@ ASSUMPTIONS = {
         "held-torque",
         "late-torque",
         "late-alike",
-        "late-attitude",
-        "late-rate",
         # The distribution of noise cannot be told from one flight.
         "gaussian-noise",
         "linear-estimate",

@@ -24,10 +24,11 @@ from starhold.certification.unmodelled import (
     Pushes,
     change_of_modelled,
     driven_errors,
-    lates,
+    late_torque,
     noisy_fields,
     samples_of,
 )
+from starhold.kernel.follower import LATE
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, TOLD_TORQUE, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
@@ -119,7 +120,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
             # Without both a torque may turn over at once.
             numbers = dict.fromkeys(CHANGE, Fraction(0)) | numbers
             pushed |= dict(zip(CHANGE, change_of_modelled(loop, envelope), strict=True))
-        yield from _late(numbers, lates(loop))
+        yield from _late(numbers, late_torque(loop))
         yield from (f"{name} has no bound" for name, x in pushed.items() if not isfinite(x))
         least |= {name: exact(x) for name, x in pushed.items() if isfinite(x)}
         if "outside" in least and OUTSIDE not in claim["taken"]:
@@ -153,20 +154,20 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         )
 
 
-def _late(numbers: Mapping[Any, Fraction], lates_told: Mapping[str, Late]) -> Iterator[str]:
-    for kind in {name.split(".")[1] for name in numbers if name.startswith("late.")}:
-        if kind not in lates_told:
-            yield f"its {kind} is not late"
-            continue
-        late, claimed = lates_told[kind], {name: numbers.get(f"late.{kind}.{name}") for name in ("kept", "mean", "most")}
-        exact = {name: numbers.get(f"late.{kind}.{name}.least") for name in ("kept", "mean")}
-        for name in ("kept", "mean"):
-            x, least = getattr(late, name), exact[name]
-            off = least is not None and (not late.alike or least > fraction(x / LARGER))
-            if off or (claimed[name] or 0) < fraction(x):
-                yield f"its {kind} is late otherwise"
-        if isfinite(late.most) and (claimed["most"] is None or claimed["most"] > fraction(late.most)):
-            yield f"its {kind} is late otherwise where it is further off"
+def _late(numbers: Mapping[Any, Fraction], late: Late | None) -> Iterator[str]:
+    told = {name.removeprefix(LATE): x for name, x in numbers.items() if name.startswith(LATE)}
+    if not told:
+        return
+    if late is None:
+        yield "its torque is not late"
+        return
+    for name, x in (("kept", late.kept), ("mean", late.mean)):
+        least = told.get(f"{name}.least")
+        off = least is not None and (not late.alike or least > fraction(x / LARGER))
+        if off or told.get(name, 0) < fraction(x):
+            yield "its torque is late otherwise"
+    if isfinite(late.most) and ("most" not in told or told["most"] > fraction(late.most)):
+        yield "its torque is late otherwise where it is further off"
 
 
 def _planned(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:

@@ -92,12 +92,12 @@ def _find_pointed(loop: Loop, like: Mapping[str, Any] | None, begun: float | Non
 
     if like is not None:
         tolerance = float(Fraction(like["tolerance"])) if "tolerance" in like else None
-    loop.known = replace(loop.known, tolerance=tolerance, late=like is None or "late.torque.mean" in like)
+    loop.known = replace(loop.known, tolerance=tolerance, lags=like is None or "late.torque.mean" in like)
     if find_pointed(loop, like, begun):
         return
-    if like is None and loop.known.lates:
+    if like is None and loop.known.late:
         why = loop.failed.get(POINTS, "no proof was found")
-        loop.known = replace(loop.known, late=False)
+        loop.known = replace(loop.known, lags=False)
         if find_pointed(loop, like, begun):
             loop.failed[POINTS] = f"with what is late: {why}"
             return

@@ -25,7 +25,7 @@ from starhold.certification.matrices import (
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
 from starhold.certification.target_motion import motion_of, perigee
-from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, is_read, lates, pushes
+from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, is_read, late_torque, pushes
 from starhold.errors import InputError
 from starhold.kernel.numbers import Rows, plus
 from starhold.laws.catalogue import Law
@@ -50,8 +50,8 @@ class Subject:
     target's motion (rad/s, rad/s2), zero for one at rest; disturbance: bound on the norm of any further torque (N m);
     total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels;
     tolerance: in the pointing claim the inertia's entries are off by this share of sqrt(J_ii J_kk) at most, None where the
-    inertia is as given; pull: bound of the torque that an inertia of one has by the gravity gradient (1/s2); late: whether
-    the pointing claim is about what comes late too."""
+    inertia is as given; pull: bound of the torque that an inertia of one has by the gravity gradient (1/s2); lags: whether
+    the pointing claim is about how late the torque is too."""
 
     loop: ClosedLoop
     disturbance: Any
@@ -62,7 +62,7 @@ class Subject:
     total_momentum: Any
     tolerance: float | None = None
     pull: Any = 0
-    late: bool = True
+    lags: bool = True
 
     @property
     def off(self) -> float:
@@ -80,9 +80,9 @@ class Subject:
         return bounds._replace(outside=bounds.outside + float(self.disturbance) + above(self.pull) * self.off)
 
     @property
-    def lates(self) -> dict[str, Late]:
-        """How late what acts and what the law is told are, in the pointing claim."""
-        return lates(self.loop) if self.late else {}
+    def late(self) -> Late | None:
+        """How late the torque is in the pointing claim."""
+        return late_torque(self.loop) if self.lags else None
 
     @property
     def moving(self) -> bool:

@@ -108,15 +108,13 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *off)))
 
 
-def lates(loop: ClosedLoop) -> dict[str, Late]:
-    """Return how late what acts and what a law is told are, by what is late; nothing where more than one part says so."""
+def late_torque(loop: ClosedLoop) -> Late | None:
+    """Return how late the torque is, with a margin for rounding; None where no actuator tells, or more than one is late."""
     actuators = _moving(loop)
     tell: Any = actuators[0].part.hook("late") if len(actuators) == 1 else None
-    return {} if tell is None else {"torque": _more(tell(actuators[0].params, loop.period))}
-
-
-def _more(late: Late) -> Late:
-    """Return bounds with a margin for rounding."""
+    if tell is None:
+        return None
+    late: Late = tell(actuators[0].params, loop.period)
     return late._replace(kept=late.kept * LARGER, mean=late.mean * LARGER, most=late.most / LARGER)
 
 
@@ -227,8 +225,7 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
             f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope, f in estimated))
         ]
         share = band_of(loop).share
-        # Rounded, it is no more than what is proved.
-        behind = [f"{LATE}{most * (1.0 - 1e-5):.6g}"] if (most := claim.numbers.get("late_torque")) else []
+        behind = [f"{LATE}{claim.numbers['late_torque']!r}"] if claim.numbers.get("late_torque") else []
         return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []), *behind)
 
     target = motion_of(loop) or AT_REST

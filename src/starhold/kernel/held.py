@@ -140,7 +140,7 @@ class Held(Follower):
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
         self.parted = minus(self.beside, turning), turning
         self.worked = [[dot(apply(self.felt, x), parts)] for parts in self.parted]
-        self.lates = self.follow(numbers)
+        self.late = self.follow(numbers)
         # 2 (1 - q0) >= |q|^2.
         self.under = self.form(self.s / 2)
         demand(definite(self.under), "V is not least on target")
@@ -246,10 +246,10 @@ class Held(Follower):
 
     def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction, Fraction]:
         """Return Q, H, F, p, r and f such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx. With
-        what is late V + the sum of weight |e|^2 does, and of that sum a share f is to spare."""
+        a torque that is late V + weight |e|^2 does, and of that sum a share f is to spare."""
         h, region, L, (falling, last, share) = self.h, tube.region, self.rate, self.motion
         near = region.sizes | {"v": 1 - region.least}
-        lates, late = self.changes_in(tube), self.behind(region.sizes, rest=True)
+        change, late = self.change_in(tube), self.behind(region.sizes, rest=True)
         push = tube.steady + tube.pushed + late.mean
         demand(push > 0, "nothing pushes")
         # How far pushes take the rates from where they go without: momentum turns with the body, less what they do to that.
@@ -298,12 +298,12 @@ class Held(Follower):
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
         over = self.form(self.s / (1 + region.least))
         form, spare = outweighed(least_form(falling, region), self.off * more, F, self.near.rates), Fraction(1)
-        if lates:
+        if self.late and change:
             # What a torque that is late does for each unit of it.
             alone = moved_by(Fraction(1))
             even = norm(reach(self.felt, [h * n for n in self.widths] + [ZERO] * 3))
             costs = Costs(left / 2, push / 2 * even + shaken(alone), even / 2, norm(alone), worked, more)
-            form, paid, spare = self.paid(lates, form, costs)
+            form, paid, spare = self.paid(self.late, change, form, costs)
             rest += paid
         return form, over, F, kept * more, rest, spare
 

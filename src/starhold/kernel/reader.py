@@ -49,7 +49,7 @@ class Reader:
         far from there and what errors that noise drives add linearly on target."""
         if not self.turned + self.rated + self.led + self.hurried:
             return Fraction(0), Fraction(0)
-        wrong, sizes = self.wrong, as_told(self.lately(region.sizes), self.wrong)
+        wrong, sizes = self.wrong, as_told(region.sizes, self.wrong)
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
         all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
@@ -58,18 +58,7 @@ class Reader:
         linear = {"q": turned / 2, "w": rated}
         curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
         less = [(full[k] - felt(self.unlike, k, near)) * x - full[k] * curved[k] for k, x in linear.items()]
-        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2 + self.delayed(region))
-
-    def delayed(self, region: Region) -> Fraction:
-        """Return how far q of an attitude that is told late is off."""
-        return late_in(region.sizes, "attitude")
-
-    def lately(self, sizes: Sizes) -> Sizes:
-        """Return the sizes of what a law would be told without errors but those of what comes late."""
-        turned, rated = (late_in(sizes, kind) for kind in ("attitude", "rate"))
-        turn = {"r": 2 * turned * self.size("r"), "a": 2 * turned * self.size("a")}
-        wrong = {"q": turned, "w": rated + turn["r"], "h": stretch(self.loop.given) * rated} | turn
-        return as_told(sizes, wrong) if turned or rated else sizes
+        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2)
 
     def size(self, letter: str) -> Fraction:
         """Return a bound of the norm of a vector from outside."""
@@ -107,8 +96,3 @@ class Reader:
         steady, turning = parts
         calm = self.stale(sizes, steady) + self.stale(sizes, turning, 0)
         return calm, felt(turning, "h", sizes) * self.h / 4 * self.size("h")
-
-
-def late_in(sizes: Sizes, kind: str) -> Fraction:
-    """Return how far off something is at most that is late."""
-    return sum((sizes.get(f"|late {kind}{rest}", Fraction(0)) for rest in ("", " rest")), Fraction(0))

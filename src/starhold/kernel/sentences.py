@@ -26,8 +26,6 @@ ASSUMPTIONS = {
     "held-torque": "the torque is what the law asks for at the last sample, and the error",
     "late-torque": "the torque that acts is off by e, which nears 0 in a period, and then changes with what is asked for",
     "late-alike": "all components of e near 0 alike, and no faster than told",
-    "late-attitude": "the attitude that the law is told is late as told",
-    "late-rate": "the rate that the law is told is late as told",
     "best-plan": "the law's torque is of a plan as told, for the given inertia and motion linearised about the rate told",
     "gaussian-noise": "noise is Gaussian, and independent from sample to sample",
     "linear-estimate": "noise drives errors of what the law is told linearly, as for the target's rate at the start",

@@ -52,7 +52,7 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
     if noise is None:
         return None
     near, every, spins = near_target(wired, Fraction(loop.loop.period)), noise.recursion.every, spins_of(wired)
-    late = loop.known.lates.get("torque")
+    late = loop.known.late
     if late is not None and late.alike:
         near, _ = steadied(near, Fraction(loop.loop.period), Fraction(late.kept), Fraction(late.mean))
     errors = [linear(wired.claim, role) for role in (CARRIED, CORRECTED)]

@@ -18,7 +18,7 @@ from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.ellipsoids import HEED, MORE, ends, highest_ratio, smallest
 from starhold.certification.evidence.finding import concluded, read
-from starhold.certification.evidence.lates import begun_late, numbers_of, of_lates, resting, weighed
+from starhold.certification.evidence.lates import begun_late, numbers_of, of_late, resting, weighed
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
@@ -89,11 +89,11 @@ class Chain:
 
     def of_level(self) -> dict[str, Any]:
         """Return the claim's numbers that follow from its level."""
-        lates = of_lates(self.motion)
+        late = of_late(self.motion.late)
         if self.motion.plan is None:
-            return {"level": self.level} | lates
+            return {"level": self.level} | late
         off = self.motion.planned(self.motion.region(Fraction(self.level)).sizes)
-        return {"level": self.level} | lates | {"plan.error": float(off) * MORE}
+        return {"level": self.level} | late | {"plan.error": float(off) * MORE}
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
@@ -110,7 +110,7 @@ class Chain:
 
     def lower(self, c: Fraction) -> Lower | None:
         """Return tau and beta for the lowest level proved to be reached from another, and that level."""
-        key = c, *self.motion.lates
+        key = c, self.motion.late
         if key not in self.tried:
             self.tried[key] = self.lowest(c)
         return self.tried[key]
@@ -217,7 +217,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
     like: the numbers of a claim, for the same start set and limits, and with noise if it includes noise."""
     if like is None:
         rates = dict.fromkeys((start_rate(loop.loop) * MORE if begun is None else begun, 0.0))
-        angles = list(map(radians, (*ANGLES, *NEAR) if loop.plan is not None or loop.known.lates else ANGLES))
+        angles = list(map(radians, (*ANGLES, *NEAR) if loop.plan is not None or loop.known.late else ANGLES))
         beyond = list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
@@ -268,7 +268,7 @@ class Pushed:
         self.larger, self.refused = list[tuple[float, float, str]](), dict[tuple[Any, ...], str]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
-        self.numbers |= numbers_of(loop.known.lates)
+        self.numbers |= numbers_of(loop.known.late)
         self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
         if loop.plan is not None:
@@ -295,7 +295,7 @@ class Pushed:
         motion = Held(wired, self.plan)
         self.plan = motion.plan
         motion.swayed, motion.apart = self.swayed, self.apart
-        motion.lates = weighed(motion, self.scales)
+        motion.late = weighed(motion, self.scales)
         return V, motion
 
     def claim(self, V: str, numbers: dict[str, Any], **evidence: Any) -> dict[str, Any]:
@@ -354,12 +354,12 @@ class Pushed:
         numbers = self.numbers | limits
         numbers |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
         for epsilon, V, motion, tried in self.leans:
-            motion.lates = begun_late(motion, sin(half), rate)
+            motion.late = begun_late(motion, sin(half), rate)
             rest = 2.0 * float(motion.s) * sin(angle / 4.0) ** 2
             rest += float(np.linalg.eigvalsh(floats(motion.G)[TURN, TURN])[-1]) * sin(half) ** 2
             level = rest + J * rate * (rate / 2.0 + epsilon * sin(half))
-            level += float(sum(late.weight * late.begun**2 for late in motion.lates))
-            motion.lates = resting(motion, level * (1.0 + 1e-6))
+            level += float(motion.late.weight * motion.late.begun**2) if motion.late else 0.0
+            motion.late = resting(motion, level * (1.0 + 1e-6))
             begun.append(Chain(motion, V, level * (1.0 + 1e-6), tried))
         if asks_more(begun[0].motion, begun[0].level, limits):
             loop.failed[POINTS] = "the torque exceeds its limit"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from ..follower import KINDS, WITHIN
+from ..follower import FIRST, REST, WITHIN
 from ..held import Held
 from ..loops import AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
@@ -49,17 +49,16 @@ def points(claim: Claim) -> Proof:
     starts = [numbers.get(name) or Fraction(0) for name in ("angle", "start.angle")]
     demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
     # What is late is in the set from the beginning.
-    behind = sum((late.weight * late.begun**2 for late in motion.lates), Fraction(0))
+    behind = motion.late.weight * motion.late.begun**2 if motion.late else Fraction(0)
     demand(behind < c or not behind, "what is late in the beginning is beyond the level")
     start = yield from contents(loop, loop.lyapunov + behind)
     region = motion.region(c)
     planned, torques = "", None
     if motion.plan is not None:
         wrong = motion.wrong
-        demand(not motion.behind(region.sizes, KINDS[1:]).most, "a plan is of what is told late")
         planned, torques = yield from motion.plan.keeps(region, (wrong["w"], wrong["q"]), as_told(region.sizes, wrong))
-    off = motion.misread(region)[0] + motion.planned(region.sizes) + motion.behind(region.sizes, KINDS[1:]).most
-    behind_at_most = motion.behind(region.sizes, KINDS[:1]).most
+    off = motion.misread(region)[0] + motion.planned(region.sizes)
+    behind_at_most = motion.behind(region.sizes).most
     if WITHIN in numbers or motion.steady is None:
         # Its components change one by one, not towards what is asked for.
         off += behind_at_most
@@ -67,10 +66,10 @@ def points(claim: Claim) -> Proof:
         yield "torque that follows", Exceeds(numbers[WITHIN], behind_at_most)
     limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques)
     if loop.signs:
-        yield "the sign never changes", Exceeds(region.least, motion.turned / 2 + motion.delayed(region))
+        yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
     tube = motion.tube(region)
-    for one in motion.changes_in(tube):
-        yield f"late {one.late.kind}", Exceeds(one.late.rest, one.settled(tube, False))
+    if motion.late and (change := motion.change_in(tube)):
+        yield "late torque", Exceeds(motion.late.rest, change.settled(tube, False))
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * motion.swing(tube))
     noise = Statement("", ())
     demand(motion.random == 0 or (SHARE in numbers and DEVIATION in numbers), "a random torque has no share")
@@ -133,8 +132,7 @@ def points(claim: Claim) -> Proof:
     misread += [("target's rate", motion.led, "rad/s"), ("target's acceleration", motion.hurried, "rad/s2")]
     begun = "V <= " + below(numbers["level"] - behind) + ", q0 > 0" * motion.even
     text = bounded_motion(numbers, begun, "", misread)
-    units = {"torque": ("N m", "torque that acts"), "attitude": ("", "attitude that it is told"), "rate": ("rad/s", "rate")}
-    text += "".join(f", the {units[one.kind][1]} late, {one.in_words(units[one.kind][0])}" for one in motion.lates)
+    text += f", the torque that acts late, {motion.late.in_words}" if motion.late else ""
     if motion.steady:
         text += f", in all components alike, and by no less than {' and '.join(map(above, motion.alike))} times"
     text += f", at no time by {above(numbers[WITHIN])} N m" if WITHIN in numbers else ""
@@ -151,8 +149,8 @@ def points(claim: Claim) -> Proof:
         *noise.assumptions,
         *limited.assumptions,
     ]
-    assumed += ["best-plan"] * bool(planned) + [f"late-{late.kind}" for late in motion.lates]
-    assumed += ["late-alike"] * (motion.steady is not None)
+    assumed += ["best-plan"] * bool(planned) + ["late-torque"] * bool(motion.late)
+    assumed += ["late-alike"] * bool(motion.steady)
     assumed += loop.untold + ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
@@ -192,7 +190,7 @@ def spread(shares: Sequence[Fraction], pushes: Sequence[tuple[Rows, Fraction]]) 
 def on_level(motion: Held, c: Fraction) -> tuple[Tube, int]:
     """Return the tube of a level from when what was late before is forgotten, and after how many periods that is."""
     tube, samples = motion.tube(motion.region(c)), 0
-    for _ in range(2 * bool(motion.lates)):
+    for _ in range(2 * bool(motion.late)):
         tube, more = forgotten(motion, tube, False)
         samples += more
     return tube, samples
@@ -201,17 +199,14 @@ def on_level(motion: Held, c: Fraction) -> tuple[Tube, int]:
 def forgotten(motion: Held, tube: Tube, whole: bool = True) -> tuple[Tube, int]:
     """Return the tube from when what was late in larger sets is forgotten, or the b of it, and after how many periods that
     is."""
-    samples = 0
-    sizes = tube.region.sizes
-    for one in motion.changes_in(tube, whole):
-        (first, rest), floor = one.late.sizes, one.settled(tube, whole, motion.leant)
-        linear = motion.steady_part(tube) if whole and one.late.kind == "torque" else Fraction(0)
-        begun, end = sizes[rest] + whole * (sizes[first] + linear), NEARLY * floor
-        samples = max(samples, periods(1 - one.kept, floor, begun, end) if end < begun else 0)
-        sizes = sizes | {rest: min(begun, end), first: linear if whole else sizes[first]}
-    if motion.lates:
-        tube = motion.tube(replace(tube.region, sizes=sizes))
-    return tube, samples
+    if (change := motion.change_in(tube, whole)) is None:
+        return tube, 0
+    sizes, floor = tube.region.sizes, change.settled(tube, whole, motion.leant)
+    linear = motion.steady_part(tube) if whole else Fraction(0)
+    begun, end = sizes[REST] + whole * (sizes[FIRST] + linear), NEARLY * floor
+    samples = periods(1 - change.kept, floor, begun, end) if end < begun else 0
+    sizes = sizes | {REST: min(begun, end), FIRST: linear if whole else sizes[FIRST]}
+    return motion.tube(replace(tube.region, sizes=sizes)), samples
 
 
 def periods(fall: Fraction, floor: Fraction, start: Fraction, end: Fraction) -> int:
