@@ -85,9 +85,7 @@ class Lagging:
         """The tube of a level where the torque is off by so much, beside its part that is linear in the state."""
         region = self.held.region(Fraction(level))
         linear = self.held.steady_part(self.held.tube(region)) if steady else Fraction(0)
-        return self.held.tube(
-            replace(region, sizes=region.sizes | {FIRST: linear, REST: Fraction(off)})
-        )
+        return self.held.tube(replace(region, sizes=region.sizes | {FIRST: linear, REST: Fraction(off)}))
 
     def lanes(self, tube, off, S):
         """States in a region and torques that are off by so much beside -Sx: some along an axis, so that all is alike."""
