@@ -39,7 +39,7 @@ SPAN = 3600.0
 TELLING, COMMANDED = ("sensor", "estimator"), ("actuator", "effector")
 """Roles whose `error` affects the law's measurements, and its command."""
 MORE, LARGER = 1.0 + 1e-12, 1.0 + 1e-6
-"""A margin for the floating-point sum, and one for how a flight's integration follows what moves within a period."""
+"""A margin for the floating-point sum, and one for how a flight follows a lag in steps of at most a tenth of it."""
 
 
 class Pushes(NamedTuple):
