@@ -116,5 +116,5 @@ def test_a_loop_that_starts_with_a_torque_further_from_its_command_does_not_star
     run = record(sh.load("three-laws").with_({"spacecraft.actuator_lag": 0.05, "simulation.duration": 1.0}), loop)
     assert np.isclose(off, np.linalg.norm(run["torque"][0] - run["command"][0]), rtol=1e-12)
     for most, inside in ((1.001 * off, True), (0.999 * off, False)):
-        told = replace(claim, numbers=claim.numbers | {"late_torque": most, "start": 10.0, "momentum": 10.0})
+        told = replace(claim, numbers=claim.numbers | {"late_torque": most, "start": 0.03})
         assert start_inside(SimpleNamespace(claims=[told]), loop) == {"pointing": inside}
