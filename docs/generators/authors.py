@@ -17,7 +17,7 @@ import typer
 from generators.kernel import files_table
 from generators.laws import POINT
 from generators.lemmas import lemmas_table
-from generators.proved import beside_table, costs_table
+from generators.proved import beside_table, costs_table, starts_table
 from generators.sets import sets_table
 from generators.sharpness import sharpness_table
 from generators.tables import fields_table, first_sentence, signature, table
@@ -220,6 +220,7 @@ TABLES = {
     "lemmas": lemmas_table,
     "dice": lambda: methods_table(Dice),
     "proved and measured": beside_table,
+    "proved starts": starts_table,
     "costs of sources": lambda: costs_table("cubesat-nadir"),
     "sharpness": sharpness_table,
 }

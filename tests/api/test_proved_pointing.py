@@ -160,3 +160,16 @@ def test_the_command_tells_the_proof_only_where_it_is_asked_for(held, tmp_path):
     assert held.proof.sentence in told
     assert "no part is left out" in told
     assert f"{math.degrees(held.proof.angle) * 3600.0:.4g}" in told
+
+
+@pytest.mark.slow
+def test_a_loop_with_appendages_is_first_proved_with_them():
+    """Which leaves out nothing, and begins nearer; what is proved of the rigid body is told beside it."""
+    scenario = load("flexible-slew")
+    proof = prove_pointing(scenario, build(scenario, scenario.pick("stiff")))
+    assert proof.left_out == ()
+    assert proof.angle == pytest.approx(math.radians(0.0136), rel=0.01)
+    first, other = proof.sentence.split(" Also proved: ")
+    assert "with states of the appendages" in first
+    assert "; no part is left out" in first
+    assert other.startswith("without the effector hinged-panels, ")

@@ -156,7 +156,7 @@ WRONG = [
     ({"requirement": [{"metric": "effort", "at_most": math.nan}]}, "at_most: found nan"),
     ({"runs": 10**10}, "campaign.runs"),
     ({"law": "../pd"}, "law"),
-    ({"over": {"initial.rate": NORMAL, "law.pd.k_rate": NORMAL}, "scenario": small(), "law": "lyapunov"}, "changes nothing"),
+    ({"over": {"initial.rate": NORMAL, "law.pd.k_rate": NORMAL}, "scenario": small(), "law": "lyapunov"}, "no effect"),
     ({"over": {"settling.rate_tolerance": uniform(0.01, 0.02)}}, "settling.rate_tolerance"),
     ({"over": {"spacecraft.inertia": NORMAL | {"sigma": 1.0}}, "runs": 90}, "moments"),
     ({"requirement": [{"metric": "settling_time"}]}, "at_most or at_least"),

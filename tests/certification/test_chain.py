@@ -14,8 +14,8 @@ from starhold.scenario.reading import load, parse
 from starhold.studies.bodies.rigid_body import STUDY
 from starhold.studies.chain import chains, links_of, sentence, summary
 from starhold.studies.modes import fresh_momentum, hand_overs
+from tests.certification.attack import Attack
 from tests.certification.handed import POINT, bounded
-from tests.certification.pointing_hunt import Attack
 from tests.missions import BASE, DETUMBLE
 
 NEXT = POINT.replace('"point"', '"hold"')

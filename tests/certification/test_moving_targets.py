@@ -14,7 +14,8 @@ from starhold.certification.wording import sentence
 from starhold.parts.catalogue import find
 from starhold.parts.epoch import DAY
 from starhold.parts.part import Fitted
-from tests.certification.pointing_hunt import Attack, hunted
+from tests.certification.attack import Attack
+from tests.certification.pointing_hunt import hunted
 from tests.making import ORBIT, flown, hub
 
 PLACE, SPEED = (7.0e6, 0.0, 0.0), (0.0, 1.0e3, 7.4e3)

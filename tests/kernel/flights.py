@@ -108,9 +108,10 @@ class Around:
         rate, slope = self.bounds.rate * np.cos(angle), -self.bounds.acceleration * np.sin(angle)
         return seen(q, rate * self.axis), seen(q, slope * self.axis)
 
-    def command(self, law, q, w, t, unit):
-        """What the law asks for, with what it is told."""
-        wrong, fast = turned_on(q, self.bounds.turned * unit), -self.bounds.rated * unit
+    def command(self, law, q, w, t, unit, misread=None):
+        """What the law asks for, with what it is told; misread: the ways in which attitude and rate are off."""
+        off, fast = misread or (unit, -unit)
+        wrong, fast = turned_on(q, self.bounds.turned * off), self.bounds.rated * fast
         if self.bounds.noise:
             angles, rated = self.bounds.noise.told()
             wrong, fast = turned_on(wrong, angles), fast + rated
@@ -177,6 +178,8 @@ class Fleet:
     def __init__(self, J, law, h, outside, error, slow, seed=1, lanes=400):
         self.J, self.law, self.h, self.outside, self.error = np.asarray(J, dtype=float), law, h, outside, error
         self.inverse, self.rng, self.lanes = np.linalg.inv(self.J), np.random.default_rng(seed), lanes
+        # `misread`: the ways of errors of attitude and rate, as push is; `added`: what a memory adds about each axis.
+        self.misread, self.added = None, 0.0
         # `growing`: what torque and error are more (N m s) times the body's rate, where there are surroundings.
         self.push, self.around, self.growing = pushes(self.rng, lanes, h, slow), None, (0.0, 0.0)
         self.surroundings = Around
@@ -213,13 +216,15 @@ class Fleet:
                 part, t = self.h / parts, n * self.h
                 fast = np.linalg.norm(w + around.target(q, t)[0], axis=0)
                 pushed, error = (x + c * fast for x, c in zip((self.outside, self.error), self.growing, strict=True))
-                commands = self.acting(around.command(self.law, q, w, t, unit), parts)
+                misread = self.misread and self.misread(n, q, w)
+                commands = self.acting(around.command(self.law, q, w, t, unit, misread), parts)
+                error = error * unit + self.added * np.sign(unit)
                 # Nothing is drawn where there is none, so that other flights stay as they are.
                 random = self.rng.normal(scale=self.around.shaken[0], size=w.shape) if self.around.shaken[0] else 0.0 * w
                 random = random * np.minimum(1.0, self.around.shaken[1] / np.maximum(np.linalg.norm(random, axis=0), 1e-300))
                 for k in range(parts):
                     outside = pushed * unit + around.loaded(unit, fast, part) + random
-                    q, w = around.after(q, w, t + (k + 0.5) * part, commands[k] + error * unit, outside, part)
+                    q, w = around.after(q, w, t + (k + 0.5) * part, commands[k] + error, outside, part)
                     # What would exceed the momentum is taken out as it comes in.
                     stored = np.maximum(np.linalg.norm(around.kept, axis=0), 1e-300)
                     around.kept = around.kept * np.minimum(1.0, (self.around.momentum or np.inf) / stored)

@@ -75,7 +75,7 @@ class Oracle(Driven):
         given = dict(self.subject)
         for field, value in told.items():
             given |= {f"measurement.{field}.{k}": x for k, x in enumerate(value)}
-        kept = [name for name in self.programs["law"]["inputs"] if name.startswith("memory.")]
+        kept = [name for name in self.programs.get("law", {"inputs": []})["inputs"] if name.startswith("memory.")]
         given |= {name: self.rng.choice([-1.0, 1.0], np.shape(w)[1:]) * self.kept for name in kept}
         return given, h
 

@@ -26,7 +26,7 @@ from starhold.kernel.theorems.pointing import forgotten, on_level
 from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
 from starhold.studies.compare import record
-from tests.certification.pointing_hunt import Attack
+from tests.certification.attack import Attack
 from tests.kernel.flights import Around, along
 from tests.tiers import leading
 

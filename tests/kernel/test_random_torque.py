@@ -23,8 +23,8 @@ from starhold.kernel.numbers import RefusedError
 from starhold.kernel.theorems.noise import DEVIATION
 from starhold.laws import lyapunov
 from starhold.parts.catalogue import fit
+from tests.certification.attack import flown
 from tests.certification.loops import free, loop_of
-from tests.certification.pointing_hunt import flown
 from tests.kernel.certificates import contents, failing, flying, radii_of, text
 from tests.kernel.oracle import Oracle, number
 from tests.tiers import leading

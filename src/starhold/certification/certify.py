@@ -17,7 +17,7 @@ from starhold.certification.evidence.detumbling import is_about
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.evidence.starts import POINTS
 from starhold.certification.matrices import above
-from starhold.certification.proofs import HELD_AND_PUSHED, detumbled, pointed, proved_claims
+from starhold.certification.proofs import HELD_AND_PUSHED, appended, detumbled, pointed, proved_claims
 from starhold.certification.subject import Subject, described, direction, exact_craft, make_subject
 from starhold.certification.unmodelled import named
 from starhold.errors import InputError
@@ -37,7 +37,7 @@ class Wanted:
     norm of the total angular momentum in claims about wheels (N m s), if absent that of the start; stored: what wheels store
     when a mode ends because of it (N m s); pointing: the pointing bound of the loop as it flies, which takes seconds, and is
     always claimed with a disturbance; begun: the rate (rad/s) at which its motions begin, if that is not the start's; alone:
-    only that claim; like: that claim, with the start set and the limits of another loop's claim."""
+    only that claim and the one with appendages; like: only that claim, with the start set and limits of another loop's."""
 
     rate: float | None = None
     slew_angle: float | None = None
@@ -108,6 +108,7 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
     if not unflown and wanted.alone:
         claim, reason = pointed(subject, wanted.like, wanted.begun, wanted.inertia_tolerance)
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
+        claims += appended(subject) if wanted.like is None else []
     elif not unflown:
         pointing = wanted.pointing or wanted.disturbance > 0.0
         bounds = wanted.slew_angle, wanted.rate, wanted.inertia_tolerance

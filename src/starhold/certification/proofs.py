@@ -85,6 +85,13 @@ def pointed(
     return next(iter(checked(loop)), None), loop.failed.get(POINTS, "no proof was found")
 
 
+def appended(subject: Subject) -> list[Claim]:
+    """Return the claim about pointing with appendages, if there are any and evidence was found."""
+    loop = Loop(subject)
+    find_appended(loop)
+    return checked(loop)
+
+
 def _find_pointed(loop: Loop, like: Mapping[str, Any] | None, begun: float | None, tolerance: float | None) -> None:
     """Find the pointing bound with the tolerance of the inertia, or without if none is proved with it."""
     # Loaded here, because its matrices need a large library.

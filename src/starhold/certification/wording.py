@@ -250,9 +250,8 @@ def _sampling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     text = f"the linear loop is stable with the torque held for {n['period']:.12g} s"
     if n["longest"] is None:
         return text
-    longest = shown(n["longest"], " s")
-    between = f"for {longest} (periods between these are not shown)"
-    return f"{text} and {f'for every period up to {longest}' if n['every_shorter'] else between}"
+    periods = "every period up to {}" if n["every_shorter"] else "{} (periods between these are not shown)"
+    return f"{text} and for {periods.format(shown(n['longest'], ' s'))}"
 
 
 def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:

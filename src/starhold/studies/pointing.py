@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from starhold.certification.certify import certify
-from starhold.certification.wording import sentence
+from starhold.certification.wording import sentence, strongest
 from starhold.laws.modes import mode_laws
 from starhold.studies.bodies.rigid_body import wanted_of
 from starhold.studies.budget import Budget, faultless, sources, study, without
@@ -25,10 +25,11 @@ FOUND = ("level", "highest", "end.angle", "end.rate", "settling")
 
 @dataclass(frozen=True)
 class ProvedPointing:
-    """The proved pointing bound of a loop. text: the claim, or the reason why there is none. angle: the bound (rad) at all
-    times after `settling` (s); None where none is proved. share: the share of orbits for which it holds, None for all.
-    left_out: parts outside the claim. starts_inside: whether the scenario starts in the certified set. shares: the decrease
-    (rad) of the bound without each source; None for a source that the claim ignores, or without which no bound is proved.
+    """The proved pointing bound of a loop. text: the claim that leaves out the fewest parts, or why there is none;
+    beside: another claim, which leaves out more. angle: the bound (rad) at all times after `settling` (s); None where none
+    is proved. share: the share of orbits for which it holds, None for all. left_out: parts outside the claim. starts_inside:
+    whether the scenario starts in the certified set. shares: the decrease (rad) of the bound without each source; None for
+    a source that the claim ignores, or without which no bound is proved.
     """
 
     text: str
@@ -38,6 +39,7 @@ class ProvedPointing:
     left_out: tuple[str, ...] = ()
     starts_inside: bool = False
     shares: Mapping[str, float | None] = field(default_factory=dict[str, "float | None"])
+    beside: str = ""
 
     @property
     def sentence(self) -> str:
@@ -46,7 +48,7 @@ class ProvedPointing:
             return f"No pointing bound is proved: {self.text}."
         whole = "" if self.left_out else "; no part is left out"
         outside = "" if self.starts_inside else "; the flight begins outside the region of this claim"
-        return f"Proved: {self.text}{whole}{outside}."
+        return f"Proved: {self.text}{whole}{outside}." + f" Also proved: {self.beside}." * bool(self.beside)
 
 
 def prove_pointing(
@@ -65,12 +67,13 @@ def prove_pointing(
         return ProvedPointing("claims are about single modes")
     wanted = replace(wanted_of(scenario, True), alone=True)
     certificate = certify(loop, "", wanted)
-    claim = certificate.claim("pointing")
-    if claim is None or claim.outcome != "proved":
+    proved = strongest([one for one in certificate.claims if one.outcome == "proved"])
+    if not proved:
         reasons = [o.evidence["reason"] for one in certificate.claims for o in one.obligations if "reason" in o.evidence]
         return ProvedPointing(next(iter(reasons), "no claim covers such a loop"))
-    n, shares = claim.numbers, dict[str, float | None]()
-    for name, make in (others or {}).items():
+    claim, shares = proved[0], dict.fromkeys(others or (), None)
+    n = claim.numbers
+    for name, make in (others or {}).items() if claim.kind == "pointing" else ():
         notice(name)
         other = certify(make(), "", replace(wanted, like=claim)).claim("pointing")
         shares[name] = None if other is None else _share(claim, other)
@@ -80,8 +83,9 @@ def prove_pointing(
         n["settling"],
         n["share"],
         tuple(claim.left_out),
-        start_inside(certificate, loop).get("pointing", False),
+        start_inside(certificate, loop).get(claim.kind, False),
         shares,
+        "; ".join(sentence(one, certificate.subject) for one in proved[1:]),
     )
 
 

@@ -1,5 +1,4 @@
-"""Finds the claim about the loop that flies: V, the descending levels of motions, and the ellipsoids of their ultimate
-bound."""
+"""Finds the claim about the loop that flies: V, the levels down to which motions come, and the ellipsoids of their end."""
 
 from __future__ import annotations
 

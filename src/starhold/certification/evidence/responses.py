@@ -15,8 +15,9 @@ from starhold.kernel.theorems.response import MOST, PARTS
 
 Array = NDArray[np.float64]
 
-LEFT = 7.0
-"""Minus the logarithm of the share of a state that is left after the samples of a response."""
+LEFT, SHORTEST = 7.0, 5.0
+"""Minus the logarithm of the share of a state that is left after the samples of a response, and the least of it where that
+takes too many."""
 FINEST, LONGEST, LEAST, MORE = 1e3, 1e9 - 1.0, 1e-4, 1.0 + 1e-7
 """The least and the largest weight, the least share of a sample relative to the mean, and the margin for rounding."""
 
@@ -25,10 +26,11 @@ def find_response(motion: Held) -> dict[str, Any] | None:
     """Return the evidence about the impulse response, for one round; None if it lasts too long."""
     A = floats(motion.near.A)
     radius = float(np.abs(np.linalg.eigvals(A)).max())
-    if radius >= 1.0 or -LEFT / log(radius) > MOST:
+    if radius >= 1.0 or -SHORTEST / log(radius) > MOST:
         return None
+    count = min(ceil(-LEFT / log(radius)), MOST)
     powers = [np.vstack([np.eye(6), floats(motion.near.rates)])]
-    for _ in range(ceil(-LEFT / log(radius)) - 1):
+    for _ in range(count - 1):
         powers.append(powers[-1] @ A)
     weighed, gains, B = list[list[int]](), list[list[str]](), list(map(floats, motion.ways))
     for part in PARTS.values():
