@@ -60,8 +60,8 @@ def random_loop(random, kind=""):
     law = "mpc" if "plans" in kinds else "pid" if "integral" in kinds else law
     lines += [*parts_of(random, some, size, numbers, orbit, wheels, k, w, period)]
     if "late" in kinds:
-        slow = f"actuator_lag = {size(0.05, 3.0) * period:.6g}", f"torque_rate_limit = {size(0.3, 30.0) * k * w:.6g}"
-        lines.insert(2, some(*slow))
+        lag, limit = size(0.05, 3.0) * period, size(0.3, 30.0) * k * w
+        lines[2:2] = [some(f"actuator_lag = {lag:.6g}", f"torque_rate_limit = {limit:.6g}")]
     if "shaken" in kinds:
         lines += ["[[part]]", 'type = "random-torque"', f"deviation = {size(1e-5, 1e-3) * k:.6g}"]
     lines += ["[simulation]", f"duration = {100.0 * period!r}", f"control_period = {period!r}"]

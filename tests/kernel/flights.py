@@ -225,7 +225,7 @@ class Fleet:
                 random = random * np.minimum(1.0, self.around.shaken[1] / np.maximum(np.linalg.norm(random, axis=0), 1e-300))
                 for k in range(parts):
                     outside = pushed * unit + around.loaded(unit, fast, part) + random
-                    q, w = around.after(q, w, t + (k + 0.5) * part, commands[k] + error * unit, outside, part)
+                    q, w = around.after(q, w, t + (k + 0.5) * part, commands[k] + error, outside, part)
                     # What would exceed the momentum is taken out as it comes in.
                     stored = np.maximum(np.linalg.norm(around.kept, axis=0), 1e-300)
                     around.kept = around.kept * np.minimum(1.0, (self.around.momentum or np.inf) / stored)

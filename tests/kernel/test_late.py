@@ -12,16 +12,22 @@ import pytest
 import starhold as sh
 from starhold.analysis.departure import first_off, start_inside
 from starhold.certification.assumptions import assumption
-from starhold.certification.evidence.finding import certificate
+from starhold.certification.evidence.claims import floats
+from starhold.certification.evidence.finding import certificate, read
 from starhold.certification.proofs import pointed
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import late_torque, named
 from starhold.kernel.check import check
-from starhold.kernel.numbers import RefusedError
+from starhold.kernel.follower import REST
+from starhold.kernel.held import Held
+from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.numbers import Account, RefusedError
+from starhold.kernel.theorems.pointing import forgotten, on_level
 from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
 from starhold.studies.compare import record
-from tests.certification.pointing_hunt import Attack
+from tests.certification.attack import Attack
+from tests.kernel.flights import Around, along
 from tests.tiers import leading
 
 LATE = [(("lag", 0.05),), (("rate-limit", 0.1),), (("lag", 0.5),)]
@@ -118,3 +124,47 @@ def test_a_loop_that_starts_with_a_torque_further_from_its_command_does_not_star
     for most, inside in ((1.001 * off, True), (0.999 * off, False)):
         told = replace(claim, numbers=claim.numbers | {"late_torque": most, "start": 0.03})
         assert start_inside(SimpleNamespace(claims=[told]), loop) == {"pointing": inside}
+
+
+def period(held, attack, x, e, unit, parts=8):
+    """The state (w, q) a period after one of these, while the torque is off by e at first, and by how much what is asked for
+    has changed: with all errors the one way and then the other."""
+    n, law, h = attack.numbers, attack.fleet().law, float(held.h)
+    around = Around(attack.fleet().around, attack.J, np.linalg.inv(attack.J), np.random.default_rng(5), x.shape[1])
+    q, w = np.concatenate([[np.sqrt(1.0 - (x[3:] ** 2).sum(0))], x[3:]]), x[:3]
+    kept, ends = float(held.late.kept), np.arange(parts + 1) / parts
+    shares = np.diff((1.0 - kept**ends) / -np.log(kept) if kept else ends - ends**2 / 2.0)
+    shares *= float(held.late.mean) / shares.sum() * parts
+    asked = around.command(law, q, w, 0.0, unit) + n["error"] * unit
+    for k, share in enumerate(shares):
+        outside = n["outside"] * unit + around.loaded(unit, 0.0 * w[0], h / parts)
+        q, w = around.after(q, w, (k + 0.5) * h / parts, asked + share * e, outside, h / parts)
+    return np.concatenate([w, q[1:]]), around.command(law, q, w, h, -unit) - n["error"] * unit - asked
+
+
+@pytest.mark.parametrize("late", leading([(("lag", 0.05),), (("lag", 0.5),), (("rate-limit", 0.1),)], 1))
+def test_no_period_exceeds_the_bounds_of_what_is_late_and_some_come_near_them(late):
+    """So nothing that counts near the target may be left out of them."""
+    Account.left = 10**12
+    _, claim, _ = flying(*late)
+    held = Held(AttitudeLoop(read(claim.proof.claim, dict(claim.proof.programs)), remembers=True))
+    attack, rng = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, 1), np.random.default_rng(2)
+    (tube, _), lanes = on_level(held, Fraction(claim.proof.claim["evidence"]["levels"][-1]["end"])), 4000
+    first, _ = forgotten(held, tube)
+    unit, way = (along(rng.normal(size=(3, lanes))) for _ in range(2))
+    x = np.linalg.cholesky(floats(tube.region.X)) @ along(rng.normal(size=(6, lanes))) * 10.0 ** rng.integers(-4, 1, lanes)
+
+    def share(tube, whole, e, S):
+        change, sizes = held.change_in(tube, whole), np.linalg.norm(e + S @ x, axis=0)
+        after, asked = period(held, attack, x, e, unit)
+        bound = np.linalg.norm(floats(change.M) @ x, axis=0) + float(change.rest) + float(change.kept) * sizes
+        return after, float((np.linalg.norm(float(held.late.kept) * e - asked + S @ after, axis=0) / bound).max())
+
+    e = float(tube.late.most) * way * rng.choice([0.0, 1.0], lanes)
+    assert 0.95 < share(tube, False, e, np.zeros((3, 6)))[1] <= 1.0
+    S = floats(held.steady.S) if held.steady else np.zeros((3, 6))
+    after, worst = share(first, True, float(first.region.sizes[REST]) * way * rng.choice([0.0, 1.0], lanes) - S @ x, S)
+    assert 0.95 < worst <= 1.0
+    ways = np.vstack([np.eye(6), rng.normal(size=(300, 6))])
+    most = sum(np.linalg.norm(ways @ floats(B), axis=1) * float(b) for B, b in held.linear(first))
+    assert 0.9 < float((np.abs(ways @ (after - floats(held.near.A) @ x)) / most[:, None]).max()) <= 1.0

@@ -155,18 +155,18 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
 
 
 def _late(numbers: Mapping[Any, Fraction], late: Late | None) -> Iterator[str]:
-    given = {name.removeprefix(LATE): x for name, x in numbers.items() if name.startswith(LATE)}
-    if not given:
+    stated = {name.removeprefix(LATE): x for name, x in numbers.items() if name.startswith(LATE)}
+    if not stated:
         return
     if late is None:
         yield "its torque is not late"
         return
     for name, x in (("kept", late.kept), ("mean", late.mean)):
-        least = given.get(f"{name}.least")
+        least = stated.get(f"{name}.least")
         off = least is not None and (not late.alike or least > fraction(x / LARGER))
-        if off or given.get(name, 0) < fraction(x):
+        if off or stated.get(name, 0) < fraction(x):
             yield "its torque is late otherwise"
-    if isfinite(late.most) and ("most" not in given or given["most"] > fraction(late.most)):
+    if isfinite(late.most) and ("most" not in stated or stated["most"] > fraction(late.most)):
         yield "its torque is late otherwise where it is further off"
 
 
