@@ -219,7 +219,7 @@ class Fleet:
                 pushed, error = (x + c * fast for x, c in zip((self.outside, self.error), self.growing, strict=True))
                 misread = self.misread and self.misread(n, q, w)
                 asked_for = around.command(self.law, q, w, t, unit, misread) + self.added * np.sign(unit)
-                commands = self.acting(asked_for, parts)
+                commands, error = self.acting(asked_for, parts), error * unit
                 # Nothing is drawn where there is none, so that other flights stay as they are.
                 random = self.rng.normal(scale=self.around.shaken[0], size=w.shape) if self.around.shaken[0] else 0.0 * w
                 random = random * np.minimum(1.0, self.around.shaken[1] / np.maximum(np.linalg.norm(random, axis=0), 1e-300))
