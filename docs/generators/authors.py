@@ -141,7 +141,9 @@ def claims_table() -> str:
             continue
         found: dict[str, list[str]] = {"every claim": [], "pointing": [], "none": []}
         for name, part in parts(role).items():
-            tells = any(part.hook(hook) is not None for hook in ("bound", "error", "noise", "perturbation", "recursion"))
+            tells = any(
+                part.hook(hook) is not None for hook in ("bound", "error", "late", "noise", "perturbation", "recursion")
+            )
             moves = role == "target" and part.hook("motion") is not None
             by = "every claim" if moves or name in READ.get(role, ()) else "pointing" if tells else "none"
             found[by].append(f"`{name}`")

@@ -31,7 +31,7 @@ ANYWHERE = {"initial.attitude": {"distribution": "rotations"}, "initial.rate": {
 
 def steady(**changes):
     """A loop of which a claim is proved, whose flights come near its target well before they end."""
-    return short(duration=80.0, sensor=NOISY, environment={}, certify={"disturbance": 1e-4}, **changes)
+    return short(duration=80.0, environment={}, certify={"disturbance": 1e-4}, **({"sensor": NOISY} | changes))
 
 
 def flown(over=ANYWHERE, runs=40, **options):
@@ -186,6 +186,7 @@ def test_the_notes_on_premises_are_what_recordings_show():
             "momentum": np.linalg.norm(total, axis=1),
             "wheel_momentum": np.abs(rotors).max(axis=1),
             "other_quaternion": np.maximum(-seen["attitude_error"][:, 0], 0.0),
+            "late_torque": np.linalg.norm(seen["torque"] - seen["command"], axis=1),
         }
         begin, ends = 0, [*meter.cuts()[:-1], len(seen["time"])]
         for number, end in enumerate(ends):
@@ -232,3 +233,20 @@ def test_no_more_flights_than_the_share_are_beyond_what_is_proved(name):
     assert [one.beyond for one in claim.within] == [0] * len(claim.within)
     assert len(claim.within) >= 2
     assert not claim.misled
+
+
+def test_flights_that_begin_with_a_torque_further_from_the_command_than_a_lag_may_be_are_covered_later(monkeypatch):
+    """Within the set of V there are larger commands than that of the start, and the torque begins with none."""
+    lag = {"spacecraft": {"inertia": [2.0, 3.0, 4.0], "torque_limit": 3.0, "actuator_lag": 0.1}, "sensor": {}}
+    scenario = steady(**lag).with_({"simulation.substeps": 8, "initial.attitude": [1.0, 0.02, 0.0, 0.0]})
+    faster = {"initial.rate": {"distribution": "shell", "low": "5 deg/s", "high": "17 deg/s"}}
+    looked, look = [], proved._look
+    monkeypatch.setattr(proved, "_look", lambda *given: looked.append((given, look(*given))) or looked[-1][1])
+    found = flown(scenario=scenario, over=faster, runs=12)
+    ((about, _, _, _, _, lot, _), seen) = looked[0]
+    assert proved._starts_inside(about, lot).all()
+    first = [np.linalg.norm(run["torque"][0] - run["command"][0]) for _, run, _ in own_runs(found, 12)]
+    further = np.array(first) > about.claim.numbers["late_torque"]
+    assert 0 < further.sum() < 12
+    assert (seen.begun[further] > 0).all()
+    assert (seen.begun[~further] == 0).all()

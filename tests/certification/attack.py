@@ -40,6 +40,8 @@ class Attack(Oracle):
             self.true, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), self.lanes
         )
         found.added = n.get("memory", 0.0)
+        if "late.torque.mean" in n:
+            found.late = n["late.torque.kept"], n["late.torque.mean"], n["late.torque.begun"]
         found.growing = n.get("outside.per.rate", 0.0), n.get("error.per.rate", 0.0)
         found.around = Surroundings(
             [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
@@ -75,12 +77,17 @@ class Attack(Oracle):
         ends[3:, : self.lanes // 8] = np.eye(3)[:, self.rng.integers(3, size=self.lanes // 8)]
         return self.extremal(ends, last)
 
+    def highest_start(self):
+        """V of the start set, beside which the torque that acts may be off by as much as is told."""
+        n = self.numbers
+        return n["level"] - n.get("late.torque.weight", 0.0) * n.get("late.torque.begun", 0.0) ** 2
+
     def worst(self):
         """What contradicts the claim, or "", and the largest angle and rate in the end as shares of the claimed ones."""
         n, h = self.numbers, self.numbers["period"]
         V0 = self.lyapunov(np.eye(4)[0], np.zeros(3))
         fleet, half = self.fleet(), self.lanes // 2
-        states = [self.border(V0, n["level"] * self.rng.uniform() * (k % 3 > 0)) for k in range(half)]
+        states = [self.border(V0, self.highest_start() * self.rng.uniform() * (k % 3 > 0)) for k in range(half)]
         begin = (np.concatenate([np.array(part).T, np.tile(rest[:, None], half)], axis=1) for part, rest in zip(
             zip(*states, strict=True), (np.eye(4)[0], np.zeros(3)), strict=True))  # fmt: skip
         near = np.arange(self.lanes) >= half
@@ -98,6 +105,8 @@ class Attack(Oracle):
             unit = usual(k, q, w)
             return steered(1, k, way * unit), steered(2, k, -unit)
 
+        # What begins on target has been there.
+        fleet.unsettled = np.where(near, 0.0, 1.0)
         fleet.push, fleet.misread, found, reached = push, misread, "", [0.0, 0.0, 0.0]
         begun = SETTLED / self.slow if "share" in n else 0.0
         for k, q, w in fleet.fly(*begin, periods):

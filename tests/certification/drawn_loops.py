@@ -59,9 +59,13 @@ def random_loop(random, kind=""):
     law = some("lyapunov", "wheel", "wheel") if wheels else some("lyapunov", "lyapunov", "pd", "matrix-pd", "lqr", "wheel")
     law = "mpc" if "plans" in kinds else "pid" if "integral" in kinds else law
     lines += [*parts_of(random, some, size, numbers, orbit, wheels, k, w, period)]
+    if "late" in kinds:
+        lag, limit = size(0.05, 3.0) * period, size(0.3, 30.0) * k * w
+        lines[2:2] = [some(f"actuator_lag = {lag:.6g}", f"torque_rate_limit = {limit:.6g}")]
     if "shaken" in kinds:
         lines += ["[[part]]", 'type = "random-torque"', f"deviation = {size(1e-5, 1e-3) * k:.6g}"]
     lines += ["[simulation]", f"duration = {100.0 * period!r}", f"control_period = {period!r}"]
+    lines += ["substeps = 64"] * ("late" in kinds)
     lines += ["[certify]", f"disturbance = {size(1e-6, 3e-2) * k:.6g}", "[[law]]", f'type = "{law}"']
     lines += [f'quaternion_sign = "{some("as_published", "shortest", "hysteresis")}"']
     if law == "mpc":

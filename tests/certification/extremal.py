@@ -62,6 +62,8 @@ class Steered(Attack):
         super().__init__(content, claim, seed, lanes)
         self.most = longest // 2
         self.fleet_of = self.fleet()
+        # Flights begin on target, where they have been.
+        self.fleet_of.unsettled = 0.0
         self.bounds = self.fleet_of.around._replace(noise=None)
         self.inverse = np.linalg.inv(self.true)
 

@@ -68,6 +68,15 @@ def test_a_claim_that_begins_a_little_nearer_does_not_take_over(missioned):
         assert first.text.startswith("not taken over: detumble may end")
 
 
+def test_how_far_a_torque_is_late_as_a_mode_begins_is_assumed(missioned):
+    """At the switch the next law may ask for another torque at once."""
+    loop, found, _ = missioned
+    point = found["mission: point"]
+    lagging = tuple(replace(one, numbers=one.numbers | {"late_torque": 0.002}) for one in point.claims)
+    first, _ = links_of(loop, "mission", found | {"mission: point": replace(point, claims=lagging)})
+    assert first.assumed == ("detumble ends", "point begins with a torque within 0.002 N m of its command")
+
+
 def test_what_nothing_bounds_is_assumed_or_lacks(missioned):
     loop, found, _ = missioned
     first, second = links_of(loop, "mission", {name: one for name, one in found.items() if name != "mission: point"})

@@ -183,6 +183,22 @@ class Fleet:
         # `growing`: what torque and error are more (N m s) times the body's rate, where there are surroundings.
         self.push, self.around, self.growing = pushes(self.rng, lanes, h, slow), None, (0.0, 0.0)
         self.surroundings = Around
+        self.late, self.off, self.unsettled = None, None, 1.0
+
+    def acting(self, command, parts):
+        """Torques that act in the parts of a period, in the mean, after what is asked for has changed."""
+        if self.late is None:
+            return [command] * parts
+        kept, _, begun = self.late
+        if self.off is None:
+            self.before, self.off = command, begun * self.directions() * self.unsettled
+        self.off = self.off - (command - self.before)
+        ends = np.arange(parts + 1) / parts
+        # A torque without anything left of e comes to what is asked for along a straight line.
+        summed = (1.0 - kept**ends) / -np.log(kept) if kept else ends - ends**2 / 2.0
+        given = [command + self.off * share * parts for share in np.diff(summed)]
+        self.before, self.off = command, kept * self.off
+        return given
 
     def directions(self):
         return along(self.rng.normal(size=(3, self.lanes)))
@@ -194,6 +210,7 @@ class Fleet:
     def fly(self, q, w, periods, parts=2):
         """Yield the states between and at samples."""
         around = self.around and self.surroundings(self.around, self.J, self.inverse, self.rng, self.lanes)
+        self.off = None
         for n in range(periods):
             unit = self.push(n, q, w)
             if around:
@@ -201,13 +218,14 @@ class Fleet:
                 fast = np.linalg.norm(w + around.target(q, t)[0], axis=0)
                 pushed, error = (x + c * fast for x, c in zip((self.outside, self.error), self.growing, strict=True))
                 misread = self.misread and self.misread(n, q, w)
-                command = around.command(self.law, q, w, t, unit, misread) + error * unit + self.added * np.sign(unit)
+                asked_for = around.command(self.law, q, w, t, unit, misread) + self.added * np.sign(unit)
+                commands, error = self.acting(asked_for, parts), error * unit
                 # Nothing is drawn where there is none, so that other flights stay as they are.
                 random = self.rng.normal(scale=self.around.shaken[0], size=w.shape) if self.around.shaken[0] else 0.0 * w
                 random = random * np.minimum(1.0, self.around.shaken[1] / np.maximum(np.linalg.norm(random, axis=0), 1e-300))
                 for k in range(parts):
                     outside = pushed * unit + around.loaded(unit, fast, part) + random
-                    q, w = around.after(q, w, t + (k + 0.5) * part, command, outside, part)
+                    q, w = around.after(q, w, t + (k + 0.5) * part, commands[k] + error, outside, part)
                     # What would exceed the momentum is taken out as it comes in.
                     stored = np.maximum(np.linalg.norm(around.kept, axis=0), 1e-300)
                     around.kept = around.kept * np.minimum(1.0, (self.around.momentum or np.inf) / stored)

@@ -52,7 +52,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
     w, q = x[:3], np.concatenate([[np.sqrt(1.0 - (x[3:] ** 2).sum(0))], x[3:]])
     told = [n.get(f"outside.{k}", 0.0) for k in range(3)]
     bounds = Surroundings(told, n["target.rate"], n["target.acceleration"], n["momentum"], 0.0, 0.0, None, changing(n))
-    Q, H, F, size, rest = held.fall(tube)
+    Q, H, F, size, rest, _ = held.fall(tube)
     Q, H, F = floats(Q), floats(H), floats(F)
     corners = np.array([floats(A) for A in held.corners()])
     linear = [(corners[9 + 2 * k] - corners[8 + 2 * k]) / (2 * 1.4144 * n["momentum"]) for k in range(3)]
@@ -146,7 +146,7 @@ def test_a_torque_that_is_told_changes_a_motion_by_no_more_than_as_fast_as_it_ma
     def used(held):
         tube = held.tube(region)
         most = sum(np.linalg.norm(ways @ floats(B), axis=1) * float(b) for B, b in held.linear(tube))
-        Q, _, F, size, rest = held.fall(tube)
+        Q, _, F, size, rest, _ = held.fall(tube)
         Q, F = floats(Q), floats(F)
         fall = h * (float(size) * np.linalg.norm(F @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
         widest = np.array([[float(one)] for one in tube.drift])

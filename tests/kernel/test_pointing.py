@@ -95,7 +95,7 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     sizes = np.array([float(region.sizes[name]) for name in STATE])
     assert (np.abs(x).max(axis=1) <= sizes).all()
     assert (np.abs(x).max(axis=1) > 0.5 * sizes).all()
-    Q, H, F, pushed, rest = held.fall(tube)
+    Q, H, F, pushed, rest, _ = held.fall(tube)
     Q, H, F, pushes = floats(Q), floats(H), floats(F), held.linear(tube)
     # What F has beside the push is of its growth in a period.
     grown, A = float(pushed / (tube.steady + tube.pushed)), held.near.A

@@ -126,7 +126,7 @@ def test_what_the_inertia_adds_is_in_what_v_changes_in_a_period(kept, monkeypatc
         monkeypatch.setattr("starhold.kernel.held.outweighed", lambda Q, *_: Q)
         monkeypatch.setattr(Held, "load", lambda *_: Fraction(0))
     tube = motion.tube(motion.region(Fraction(1, 10**5)))
-    Q, _, F, push, rest = motion.fall(tube)
+    Q, _, F, push, rest, _ = motion.fall(tube)
     Q, F, G, s = floats(Q), floats(F), floats(motion.G), float(motion.s)
 
     def height(x):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import relative
 from starhold.algebra.scalar import side
-from starhold.algebra.vector import ZERO, add, apply, subtract
+from starhold.algebra.vector import ZERO, add, apply, norm, subtract
 from starhold.analysis.meter import ALMOST, on_limit
 from starhold.analysis.rigid_body import error_angle
 from starhold.certification.appendages import recorded_states, start_of
@@ -245,7 +245,8 @@ def covered(
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     """Return whether the loop starts in the sets of the proved claims about a level of V."""
-    # The true initial state, not the measured one.
+    # The true initial state, not the measured one, but the command that flies.
+    off = first_off(loop)
     loop, inside = loop.without("sensor", "estimator"), dict[str, bool]()
     shown = shown_at(loop, loop.start)
     momentum = momentum_of(loop, shown)
@@ -254,10 +255,18 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
         if value is not None and "start" in claim.numbers:
             level = claim.numbers["start"]
             within = momentum <= claim.numbers.get("momentum", np.inf) and (level is None or value <= level)
+            within = within and off <= claim.numbers.get("late_torque", np.inf)
             if "begun" in claim.numbers:
                 within = within and bool((np.abs(start_of(loop)) <= claim.numbers["begun"]).all())
             inside[claim.kind] = bool(within)
     return inside
+
+
+def first_off(loop: ClosedLoop) -> float:
+    """Return how far the torque that acts as a flight starts is from its first command (N m)."""
+    carry, step = loop.carry(), make_step(loop.composition())
+    first = step.update(carry, 0, (loop.seed, loop.run), loop.gains, loop.known, loop.setup())
+    return norm(subtract(carry.state.torque, first.command))
 
 
 def measured_at(loop: ClosedLoop, state: Any) -> Any:

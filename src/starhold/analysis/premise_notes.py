@@ -1,4 +1,5 @@
-"""Notes on the premises of a claim about a loop as it flies: the estimation errors, and the momentum of body and wheels."""
+"""Notes on the premises of a claim about a loop as it flies: the estimation errors, the momentum of body and wheels, and how
+far the torque that acts is from the command."""
 
 from __future__ import annotations
 
@@ -21,14 +22,15 @@ MODES = {"mode": ("mode at the end", "1"), "time_in_mode": ("time since the mode
 
 class Premises(NamedTuple):
     """The maxima in a window: the squared sine of half the angle error, and the squared rate error, of the law's inputs;
-    the squared momentum of body and wheels; a wheel's momentum; and how far q0 is below zero. modes: at its last instant,
-    the mode and for how long (s) it has flown, for a law of modes."""
+    the squared momentum of body and wheels; a wheel's momentum; how far q0 is below zero; and the squared torque beside the
+    command. modes: at its last instant, the mode and for how long (s) it has flown, for a law of modes."""
 
     attitude: float
     rate: float
     momentum: float
     wheel: float
     other: float
+    late: float
     modes: tuple[float, ...]
 
 
@@ -42,7 +44,7 @@ class Masses(NamedTuple):
 
 def begun(masses: Masses | None) -> Any:
     """Return the notes before a flight; none if none are wanted."""
-    return () if masses is None else Premises(0.0, 0.0, 0.0, 0.0, 0.0, masses.modes)
+    return () if masses is None else Premises(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, masses.modes)
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
@@ -52,6 +54,7 @@ def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
     attitude, rate = (quantities[name] for name in ("attitude", "rate"))
     turned = relative(attitude, quantities.get(f"{TOLD}attitude", attitude))
     off = subtract(quantities.get(f"{TOLD}rate", rate), rate)
+    late = subtract(quantities["torque"], quantities["command"])
     total, rotors = apply(masses.inertia, rate), quantities.get("wheel_momentum", ())
     total = add(total, weighted(rotors, masses.axes)) if rotors else total
     return Premises(
@@ -60,6 +63,7 @@ def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
         maximum(seen.momentum, dot(total, total)),
         maximum(seen.wheel, most(rotors)) if rotors else seen.wheel,
         maximum(seen.other, -quantities["attitude_error"][0]),
+        maximum(seen.late, dot(late, late)),
         (quantities["mode"], quantities["time_in_mode"]) if seen.modes else (),
     )
 
@@ -74,5 +78,6 @@ def windows(rows: Any) -> dict[str, Window]:
         "momentum": Window(rows.momentum, np.sqrt, "momentum of body and wheels", "N m s"),
         "wheel_momentum": Window(rows.wheel, KINDS["number"], "momentum of a wheel", "N m s"),
         "other_quaternion": Window(rows.other, KINDS["number"], "how far q0 is below zero", "1"),
+        "late_torque": Window(rows.late, np.sqrt, "torque that acts less the command", "N m"),
         **{name: Window(row, KINDS["number"], *MODES[name]) for name, row in zip(MODES, rows.modes, strict=False)},
     }

@@ -3,8 +3,8 @@ then on the claim bounds it. Of a law of modes each claim is about the flights t
 
 A flight has them from the start where it starts in the claim's set, or from a window of time on in which its angles and
 rates are in that set, the law is told no more wrongly than the claim assumes, and the momentum is within its bound: so a
-flight is covered once its estimate has settled, or once it comes from outside. It must be a flight of the claim's own
-loop, in all numbers but the start."""
+flight is covered once its estimate has settled, or once it comes from outside. With a lag the torque that acts must then be
+as near to the command as the claim assumes. It must be a flight of the claim's own loop, in all numbers but the start."""
 
 from __future__ import annotations
 
@@ -226,6 +226,9 @@ def _look(
         inside[0] |= starts
     elif not about.issued.step and mode in (None, 1):
         inside[0] |= _starts_inside(about, lot)
+    if late := n.get("late_torque"):
+        # As a claim begins the torque that acts may be no further from the command.
+        inside &= shown["late_torque"] <= late
     # An estimate may be right before it has settled, for which it has half of the flight.
     place, starts_by = np.arange(len(begins))[:, None], begins[:, None]
     settles = np.where(~right & (starts_by < about.steps / 2.0), place, -1).max(axis=0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from starhold.algebra.quaternion import conjugate, multiply, to_reference
 from starhold.algebra.vector import ZERO
-from starhold.certification.certificate import ORBIT, STEADY, UNTIL, WITHOUT, Claim
+from starhold.certification.certificate import LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
 from starhold.certification.orbit_band import strays
 from starhold.certification.target_motion import motion_of
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
@@ -45,6 +45,15 @@ def assumption(identifier: str) -> Assumption:
     if identifier.startswith(ORBIT):
         share = 100.0 * float(identifier.removeprefix(ORBIT))
         return Assumption(f"distance, speed and momentum of the orbit within {share:.3g} % of two-body motion", _strayed)
+    if identifier.startswith(LATE):
+        most = float(identifier.removeprefix(LATE))
+
+        def late(span: Any) -> Unmet:
+            off = np.linalg.norm(span["torque"] - span["command"], axis=1)
+            # Only as the flight begins: what it becomes follows.
+            return [(off[:1] > most * MORE, "the torque that acts is further from the command")]
+
+        return Assumption(f"a torque that acts within {most:.4g} N m of the command at the start", late)
     if identifier.startswith(UNTIL):
         until = float(identifier.removeprefix(UNTIL))
 
@@ -204,6 +213,8 @@ ASSUMPTIONS = {
         "appendages-as-given",
         "bounded-push",
         "held-torque",
+        "late-torque",
+        "late-alike",
         # The distribution of noise cannot be told from one flight.
         "gaussian-noise",
         "linear-estimate",

@@ -109,7 +109,7 @@ class Claim:
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
-WITHOUT, ORBIT, UNTIL = "without:", "orbit-within:", "until:"
+WITHOUT, ORBIT, UNTIL, LATE = "without:", "orbit-within:", "until:", "late:"
 """Begin the identifiers of the assumptions that a part is not there, role and name, that forces move the orbit by no more
 than a share, and that a flight has not lasted longer (s)."""
 STEADY = "steady-target"

@@ -19,14 +19,23 @@ from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
 from starhold.certification.subject import make_subject
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, noisy_fields, samples_of
+from starhold.certification.unmodelled import (
+    LARGER,
+    Pushes,
+    change_of_modelled,
+    driven_errors,
+    late_torque,
+    noisy_fields,
+    samples_of,
+)
+from starhold.kernel.follower import LATE
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, TOLD_TORQUE, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.plans import PLANNED
 from starhold.kernel.theorems.noise import BESIDE, DEVIATION, VECTORS
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import DEVIATIONS
+from starhold.parts.contract import DEVIATIONS, Late
 from starhold.parts.effectors.wheel_motion import at_top_speed
 from starhold.parts.effectors.wheels import BAND, gives_allocated_torque
 
@@ -111,6 +120,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
             # Without both a torque may turn over at once.
             numbers = dict.fromkeys(CHANGE, Fraction(0)) | numbers
             pushed |= dict(zip(CHANGE, change_of_modelled(loop, envelope), strict=True))
+        yield from _late(numbers, late_torque(loop))
         yield from (f"{name} has no bound" for name, x in pushed.items() if not isfinite(x))
         least |= {name: exact(x) for name, x in pushed.items() if isfinite(x)}
         if "outside" in least and OUTSIDE not in claim["taken"]:
@@ -142,6 +152,22 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
             for name, x in most.items()
             if "." in name and name[0] in "ms" and isfinite(x) and name not in numbers
         )
+
+
+def _late(numbers: Mapping[Any, Fraction], late: Late | None) -> Iterator[str]:
+    stated = {name.removeprefix(LATE): x for name, x in numbers.items() if name.startswith(LATE)}
+    if not stated:
+        return
+    if late is None:
+        yield "its torque is not late"
+        return
+    for name, x in (("kept", late.kept), ("mean", late.mean)):
+        least = stated.get(f"{name}.least")
+        off = least is not None and (not late.alike or least > fraction(x / LARGER))
+        if off or stated.get(name, 0) < fraction(x):
+            yield "its torque is late otherwise"
+    if isfinite(late.most) and ("most" not in stated or stated["most"] > fraction(late.most)):
+        yield "its torque is late otherwise where it is further off"
 
 
 def _planned(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:

@@ -99,8 +99,16 @@ def _find_pointed(loop: Loop, like: Mapping[str, Any] | None, begun: float | Non
 
     if like is not None:
         tolerance = float(Fraction(like["tolerance"])) if "tolerance" in like else None
-    loop.known = replace(loop.known, tolerance=tolerance)
-    if find_pointed(loop, like, begun) or tolerance is None or like is not None:
+    loop.known = replace(loop.known, tolerance=tolerance, lags=like is None or "late.torque.mean" in like)
+    if find_pointed(loop, like, begun):
+        return
+    if like is None and loop.known.late:
+        why = loop.failed.get(POINTS, "no proof was found")
+        loop.known = replace(loop.known, lags=False)
+        if find_pointed(loop, like, begun):
+            loop.failed[POINTS] = f"with what is late: {why}"
+            return
+    if tolerance is None or like is not None:
         return
     why = loop.failed.get(POINTS, "no proof was found")
     loop.known = replace(loop.known, tolerance=None)
@@ -274,7 +282,10 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         f"{name}_error": sum(float(numbers.get(f"{kind}.{name}", 0)) for kind in ("error", "noise"))
         for name in ("attitude", "rate")
     }
-    ends = {"start": "level", "level": "highest", "settling": "settling", "angle": "end.angle", "rate": "end.rate"}
+    behind = (
+        numbers["late.torque.weight"] * numbers["late.torque.begun"] ** 2 if "late.torque.mean" in numbers else Fraction(0)
+    )
+    ends = {"level": "highest", "settling": "settling", "angle": "end.angle", "rate": "end.rate"}
     return {
         "period": float(numbers["period"]),
         "slew_angle": angle,
@@ -288,6 +299,8 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         "samples": int(numbers.get("samples", 0)),
         **{name: float(numbers[name]) for name in ("momentum", "memory") if name in numbers},
         **({"plan_error": above(numbers["plan.error"])} if "plan.error" in numbers else {}),
+        **({"late_torque": below(numbers["late.torque.begun"])} if "late.torque.begun" in numbers else {}),
+        "start": above(numbers["level"] - behind),
         **{name: above(numbers[key]) for name, key in ends.items()},
     }
 

@@ -25,12 +25,12 @@ from starhold.certification.matrices import (
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
 from starhold.certification.target_motion import motion_of, perigee
-from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, is_read, pushes
+from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, is_read, late_torque, pushes
 from starhold.errors import InputError
 from starhold.kernel.numbers import Rows, plus
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import AT_REST, Envelope
+from starhold.parts.contract import AT_REST, Envelope, Late
 from starhold.parts.craft import Craft, tensor
 from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels
 from starhold.parts.environments.gravity_gradient import gravity_gradient
@@ -50,7 +50,8 @@ class Subject:
     target's motion (rad/s, rad/s2), zero for one at rest; disturbance: bound on the norm of any further torque (N m);
     total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels;
     tolerance: in the pointing claim the inertia's entries are off by this share of sqrt(J_ii J_kk) at most, None where the
-    inertia is as given; pull: bound of the torque that an inertia of one has by the gravity gradient (1/s2)."""
+    inertia is as given; pull: bound of the torque that an inertia of one has by the gravity gradient (1/s2); lags: whether
+    the pointing claim is about how late the torque is too."""
 
     loop: ClosedLoop
     disturbance: Any
@@ -61,6 +62,7 @@ class Subject:
     total_momentum: Any
     tolerance: float | None = None
     pull: Any = 0
+    lags: bool = True
 
     @property
     def off(self) -> float:
@@ -76,6 +78,11 @@ class Subject:
         """Return bounds of what acts on the loop and is told to no law, the pull on what the inertia is off by included."""
         bounds = pushes(self.loop, envelope)
         return bounds._replace(outside=bounds.outside + float(self.disturbance) + above(self.pull) * self.off)
+
+    @property
+    def late(self) -> Late | None:
+        """How late the torque is in the pointing claim."""
+        return late_torque(self.loop) if self.lags else None
 
     @property
     def moving(self) -> bool:

@@ -13,11 +13,11 @@ from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import Vector, apply, norm, scale
 from starhold.certification.appendages import appendages
-from starhold.certification.certificate import ORBIT, STEADY, UNTIL, WITHOUT, Claim
+from starhold.certification.certificate import LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
 from starhold.certification.orbit_band import band_of, extremes, movers
 from starhold.certification.target_motion import motion_of
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import AT_REST, DEVIATIONS, NO_ERRORS, Envelope, Errors, Noise, Push, Recursion
+from starhold.parts.contract import AT_REST, DEVIATIONS, NO_ERRORS, Envelope, Errors, Late, Noise, Push, Recursion
 from starhold.parts.craft import tensor
 from starhold.parts.orbit import period_of
 from starhold.parts.part import Fitted, Part
@@ -38,8 +38,8 @@ SPAN = 3600.0
 """The time (s) covered by a claim with a share where there is no orbit."""
 TELLING, COMMANDED = ("sensor", "estimator"), ("actuator", "effector")
 """Roles whose `error` affects the law's measurements, and its command."""
-MORE = 1.0 + 1e-12
-"""A margin for the floating-point sum."""
+MORE, LARGER = 1.0 + 1e-12, 1.0 + 1e-6
+"""A margin for the floating-point sum, and one for how a flight follows a lag in steps of at most a tenth of it."""
 
 
 class Pushes(NamedTuple):
@@ -106,6 +106,21 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     motion = motion_of(loop) or AT_REST
     off = motion.off_rate, motion.off_acceleration
     return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *off)))
+
+
+def late_torque(loop: ClosedLoop) -> Late | None:
+    """Return how late the torque is, with a margin for rounding; None where no actuator tells, or more than one is late."""
+    actuators = _moving(loop)
+    tell: Any = actuators[0].part.hook("late") if len(actuators) == 1 else None
+    if tell is None:
+        return None
+    late: Late = tell(actuators[0].params, loop.period)
+    return late._replace(kept=late.kept * LARGER, mean=late.mean * LARGER, most=late.most / LARGER)
+
+
+def _moving(loop: ClosedLoop) -> list[Fitted]:
+    """Return the actuators whose output moves between control instants."""
+    return [fitted for fitted in loop.used("actuator") if fitted.part.hook("rates") is not None]
 
 
 def environment_torques(loop: ClosedLoop, envelope: Envelope) -> tuple[Push, float]:
@@ -205,12 +220,13 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
         envelope = envelope_of(loop, momentum, bool(noisy))
         moved = appendages(loop) if claim.kind == "appendages" else ()
-        there = (*noisy, *moved)
+        there = (*noisy, *moved, *(_moving(loop) if claim.numbers.get("late_torque") else ()))
         absent = [
             f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope, f in estimated))
         ]
         share = band_of(loop).share
-        return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []))
+        behind = [f"{LATE}{claim.numbers['late_torque']!r}"] if claim.numbers.get("late_torque") else []
+        return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []), *behind)
 
     target = motion_of(loop) or AT_REST
     moved = [STEADY] * target.jumps + [f"{UNTIL}{target.until:.6g}"] * isfinite(target.until)

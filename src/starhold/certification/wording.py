@@ -234,6 +234,7 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds = [f"torques from outside {pushed('torque')}{' beside those that the law is told' * bool(n['told'])}{random}"]
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name] > 1e-12]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
+    bounds += [f"a lag of the torque, at first of up to {shown(n['late_torque'], ' N m')}"] if "late_torque" in n else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
     bounds[-1] += " of the inertia as given" * ("momentum" in n and "tolerance" in n)
     bounds += [OFF.format(shown(100.0 * n["tolerance"], " %"))] if "tolerance" in n else []

@@ -216,7 +216,10 @@ def draws_in_its_range(part: Part) -> None:
 
 def keeps_what_it_says(part: Part) -> None:
     """No torque is larger than its `bound` or changes faster than its `torque_change`, no error is larger than its `error`,
-    besides its `noise`, and no motion of a target than its `motion`."""
+    besides its `noise`, and no motion of a target than its `motion`; an output follows the command as it says by `late`."""
+    if part.hook("late") is not None:
+        _follows_as_it_says(part)
+        return
     tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
     # A body has an equation of this name.
     tell_motion = part.hook("motion") if part.role == "target" else None
@@ -263,6 +266,30 @@ def _changes(part: Part, loop: ClosedLoop, change: Push) -> Iterator[tuple[str, 
                 torques.append(module.torque(state, numbers, loop.craft, memory))
             size = norm(subtract(torques[1], torques[0])) / (2.0 * time)
             yield "change of the torque", size, change.torque + change.per_rate * norm(rate)
+
+
+def _follows_as_it_says(part: Part) -> None:
+    """An actuator's output, integrated in fine steps, comes nearer to a command that is held as `late` says, whatever it is
+    off by at first."""
+    module, random, steps = cast(Any, part.module), np.random.default_rng(4), 2000
+    for params in part.examples():
+        numbers, late = Fitted(part, params).prepared(PERIOD), module.late(params, PERIOD)
+        require(0.0 <= late.kept < 1.0 and 0.0 < late.mean <= 1.0 and late.most > 0.0, f"{late} is not of what is late")
+        for _ in range(STEPS):
+            target = random.normal(size=3)
+            off = random.uniform(-1.0, 1.0, size=3) * min(late.most, 1.0) * 0.999
+            output, begun, sizes = target + off, target + off, [1.0]
+            for _ in range(steps):
+                rate = module.rates(tuple(output), tuple(target), tuple(begun), PERIOD, numbers)
+                output = output + np.array(rate) * PERIOD / steps
+                sizes.append(float(np.linalg.norm(output - target) / np.linalg.norm(off)))
+            mean = float(np.mean(sizes[:-1]) + np.mean(sizes[1:])) / 2.0
+            require(bool(np.diff(sizes).max() < 1e-9), "it goes away from the command")
+            for name, size, most in (("mean", mean, late.mean), ("kept", sizes[-1], late.kept)):
+                require(size <= most + 1e-3, f"{name} is {size:g}, larger than {most:g}")
+                require(not late.alike or size >= most - 1e-3, f"{name} is {size:g}, and not exactly {most:g}")
+            straight = np.linalg.norm(np.cross(output - target, off)) <= 1e-9 * float(off @ off)
+            require(not late.alike or bool(straight), "it comes nearer otherwise in each component")
 
 
 def _moves_as_it_says(part: Part) -> None:

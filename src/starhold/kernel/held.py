@@ -8,16 +8,15 @@ Docs/kernel.md, 10.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 
+from .follower import Costs, Follower
 from .loops import AXES, NONE, AttitudeLoop
 from .near import CHANGE, MOMENTA, between, form_of, near_target
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .plans import PLANNED, Plan
 from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
-from .reader import Reader
 from .regions import (
     ANGLE,
     AT_REST,
@@ -50,7 +49,7 @@ from .regions import (
 WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
 
 
-class Held(Reader):
+class Held(Follower):
     """A loop with its torque held for a period, and V = s (1 - q0) + x.Gx."""
 
     def __init__(self, loop: AttitudeLoop, plan: Plan | None = None) -> None:
@@ -141,6 +140,7 @@ class Held(Reader):
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
         self.parted = minus(self.beside, turning), turning
         self.worked = [[dot(apply(self.felt, x), parts)] for parts in self.parted]
+        self.late = self.follow(numbers)
         # 2 (1 - q0) >= |q|^2.
         self.under = self.form(self.s / 2)
         demand(definite(self.under), "V is not least on target")
@@ -187,7 +187,7 @@ class Held(Reader):
         X = [[c * x for x in row] for row in inverse(self.under)]
         sizes = {name: root(X[i][i]) for i, name in enumerate(STATE)}
         sizes |= lengths(X)
-        sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in (*STATE[TURN], ANGLE)}
+        sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in (*STATE[TURN], ANGLE)} | self.of_level(c)
         return Region(X, sizes | self.others, least)
 
     def planned(self, sizes: Sizes) -> Fraction:
@@ -198,38 +198,6 @@ class Held(Reader):
         """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
         outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
         return {"outside": outside + sizes[LOAD], "both": outside + error + sizes[LOAD] + self.planned(sizes)}
-
-    def load(self, sizes: Sizes, acceleration: Fraction) -> Fraction:
-        """Return how far the torque that the body takes is from that of the given inertia."""
-        w, r = sizes[SPEED], self.size("r")
-        return self.off * (acceleration + self.size("a") + w * r + (w + r) ** 2)
-
-    def changes(self, sizes: Sizes, turning: int = 1) -> dict[str, Fraction]:
-        """Return by how much target, momentum and torque from outside change in the mean of a period: those from nothing on;
-        the torque is at no time nearer than this to what the law is told. turning: 0 without what the body's own rate does
-        to momentum."""
-        e, r, a, H = (self.size(letter) for letter in "erah")
-        w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
-        turned = (turning * w + r) * H + e + outside
-        return {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * turned, "e": min(2 * e, self.gradual(sizes))}
-
-    def gradual(self, sizes: Sizes) -> Fraction:
-        """Return by how much a torque that is told changes in the mean of a period, or twice itself if it may at once."""
-        if self.change is None:
-            return 2 * self.size("e")
-        return self.h / 2 * (self.change[0] + self.change[1] * (sizes[SPEED] + self.size("r")))
-
-    def stale(self, sizes: Sizes, parts: list[Poly], turning: int = 1, letters: str = "raeh") -> Fraction:
-        """Return by how much parts change by that, or by some of it."""
-        changes = self.changes(sizes, turning)
-        return sum((felt(parts, letter, sizes) * changes[letter] for letter in letters), ZERO)
-
-    def unlike_body(self, sizes: Sizes, parts: Sequence[list[Poly]]) -> tuple[Fraction, Fraction]:
-        """Return `stale` of two parts, of which the second follows momentum that turns with the body as without pushes; and
-        what is more for each rate that pushes add until the end of a period."""
-        steady, turning = parts
-        calm = self.stale(sizes, steady) + self.stale(sizes, turning, 0)
-        return calm, felt(turning, "h", sizes) * self.h / 4 * self.size("h")
 
     def speeds(self, sizes: Sizes) -> Sizes:
         """Return how fast the variables of a motion without pushes change at most."""
@@ -249,7 +217,7 @@ class Held(Reader):
         begun = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
         steady, uneven = self.misread(region)
         rigid = sum((felt(within_tube, x, sizes) * self.size(x) for x, within_tube in self.rigid.items()), Fraction(0))
-        steady, uneven = steady + rigid + self.lasting, uneven + rigid + self.lasting
+        steady, uneven, late = steady + rigid + self.lasting, uneven + rigid + self.lasting, self.behind(sizes)
 
         def within(wide: list[Fraction], load: Fraction) -> Sizes:
             return sizes | named(STATE[RATE], wide) | {SPEED: sizes[SPEED] + norm(beyond(wide, sizes)), LOAD: load}
@@ -258,12 +226,12 @@ class Held(Reader):
             *wide, load = bounds
             within_tube = within(wide, load)
             stale = self.stale(within_tube, self.beside)
-            push = steady + self.pushed(within_tube)["both"] + stale
+            push = steady + self.pushed(within_tube)["both"] + stale + late.mean
             slopes = [[most(p.slope(name), within_tube) for name in STATE[RATE]] for p in self.bend]
             columns = zip(begun, reach(slopes, beyond(wide, sizes)), self.widths, strict=True)
             faster = [u + more + push * n for u, more, n in columns]
             wide = [sizes[x] + self.h * more for x, more in zip(STATE[RATE], faster, strict=True)]
-            return [*wide, self.load(within_tube, norm(faster) + stale * self.light)]
+            return [*wide, self.load(within_tube, norm(faster) + (stale + late.most - late.mean) * self.light)]
 
         *wide, load = settled(reached, [*(sizes[name] for name in STATE[RATE]), ZERO])
         far = within(wide, load)
@@ -272,59 +240,87 @@ class Held(Reader):
         demand(not self.even or region.least > turned, "motions pass a half turn")
         pushed, stale = self.pushed(far)["both"], self.stale(far, self.beside)
         bent = [[most(p.slope(name), far) for name in STATE[RATE]] for p in self.bend]
-        return Tube(region, far, beyond(wide, sizes), turned, steady, pushed, stale, uneven, bent)
+        end = beyond(wide, sizes)
+        drift = [x + self.h * (late.moved - late.mean) * n for x, n in zip(end, self.widths, strict=True)]
+        return Tube(region, far, drift, turned, steady, pushed, stale, uneven, bent, late, end)
 
-    def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
-        """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
+    def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction, Fraction]:
+        """Return Q, H, F, p, r and f such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx. With
+        a torque that is late V + weight |e|^2 does, and of that sum a share f is to spare."""
         h, region, L, (falling, last, share) = self.h, tube.region, self.rate, self.motion
         near = region.sizes | {"v": 1 - region.least}
-        push = tube.steady + tube.pushed
+        change, late = self.change_in(tube), self.behind(region.sizes, rest=True)
+        push = tube.steady + tube.pushed + late.mean
         demand(push > 0, "nothing pushes")
         # How far pushes take the rates from where they go without: momentum turns with the body, less what they do to that.
         calm, slower = self.unlike_body(tube.sizes, self.parted)
-        away = settled(
-            lambda d: [
-                h * ((push + calm + slower * norm(d)) * n + y) for n, y in zip(self.widths, reach(tube.bent, d), strict=True)
-            ]
-        )
+
+        def moved_by(p: Fraction) -> list[Fraction]:
+            columns = [*zip(self.widths, tube.bent, strict=True)]
+            return settled(lambda d: [h * ((p + slower * norm(d)) * n + reach([row], d)[0]) for n, row in columns])
+
+        away = moved_by(push + calm + late.moved - late.mean)
         slope = {name: most(L.slope(name), tube.sizes) for name in ("q0", *STATE)}
         moved = [*tube.drift, *[tube.turned] * 3, *[h * tube.sizes[SPEED] * self.size("h")] * 3]
         # What changes of momentum do to V, which is less than what their torques do to the body.
-        calm, slower = self.unlike_body(tube.sizes, self.worked)
-        rest = calm + slower * norm(away) + share * fastest(last, tube.sizes, self.speeds(tube.sizes))
+        still, worse = self.unlike_body(tube.sizes, self.worked)
+        curved = {name: [most(p, tube.sizes) for p in self.curvature[name]] for name in STATE[RATE]}
+        steep = {
+            name: most(p, near) + reach([curved[name]], [tube.turned, *moved])[0]
+            for name, p in zip(curved, self.steep, strict=True)
+        }
+
+        def shaken(away: list[Fraction]) -> Fraction:
+            # What V' has of the rates, which pushes change.
+            changed = sum((d / 2 * x for d, x in zip(away, steep.values(), strict=True)), worse * norm(away))
+            return changed + h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
+
+        rest = still + shaken(away) + share * fastest(last, tube.sizes, self.speeds(tube.sizes))
         # What pushes do to V grows with what the state does in the period: linearly, and what is left.
-        drift = self.astray(tube)
+        drift = self.astray(tube, tube.late.moved - late.moved)
         # Of the acceleration that an inertia resists the part that is linear in the state is no push.
-        kept = push - tube.sizes[LOAD] + self.load(tube.sizes, norm(drift) / h + tube.stale * self.light)
+        sudden = (tube.stale + tube.late.most) * self.light
+        kept = push - tube.sizes[LOAD] + self.load(tube.sizes, norm(drift) / h + sudden)
         turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
-        rest += push / 2 * norm(reach(self.felt, [*drift, *[turned] * 3]))
-        # So does what V' has of the rates, which pushes change.
-        for name, d, steep in zip(STATE[RATE], away, self.steep, strict=True):
-            curved = [most(p, tube.sizes) for p in self.curvature[name]]
-            rest += d / 2 * (most(steep, near) + reach([curved], [tube.turned, *moved])[0])
-        rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
-        onward = self.near.rates + beside(scalar(Fraction(1, 2)), scalar(0))
-        growing = [[h / 2 * y for y in row] for row in times(self.felt, onward)]
-        growing += [[norm(away) / (2 * kept) * y for y in row] for row in self.steepness]
+        left = norm(reach(self.felt, [*drift, *[turned] * 3]))
+        rest += push / 2 * left
+        onward = times(self.felt, self.near.rates + beside(scalar(Fraction(1, 2)), scalar(0)))
         # |a| + |b| + |c| <= sqrt(1 + 2/w) |(a, wb, wc)| with w = sqrt(WEIGHT).
-        F = self.felt + [[root(WEIGHT) * y for y in row] for row in growing]
+        more = root(1 + 2 / WEIGHT)
+
+        def worked(displaced: Fraction) -> Rows:
+            growing = [[h / 2 * y for y in row] for row in onward] + [
+                [displaced / 2 * y for y in row] for row in self.steepness
+            ]
+            return self.felt + [[root(WEIGHT) * y for y in row] for row in growing]
+
+        F = worked(norm(away) / kept)
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
         over = self.form(self.s / (1 + region.least))
-        more = root(1 + 2 / WEIGHT)
-        return outweighed(least_form(falling, region), self.off * more, F, self.near.rates), over, F, kept * more, rest
+        form, spare = outweighed(least_form(falling, region), self.off * more, F, self.near.rates), Fraction(1)
+        if self.late and change:
+            # What a torque that is late does for each unit of it.
+            alone = moved_by(Fraction(1))
+            even = norm(reach(self.felt, [h * n for n in self.widths] + [ZERO] * 3))
+            costs = Costs(left / 2, push / 2 * even + shaken(alone), even / 2, norm(alone), worked, more)
+            form, paid, spare = self.paid(self.late, change, form, costs)
+            rest += paid
+        return form, over, F, kept * more, rest, spare
 
     def swing(self, tube: Tube) -> Fraction:
         """Return a bound of |V'| between samples."""
         sizes = tube.sizes
-        return most(self.rate, sizes) + (tube.push + tube.stale) * norm(reach(self.felt, [sizes[name] for name in STATE]))
+        return most(self.rate, sizes) + (tube.push + tube.stale + tube.late.most) * norm(
+            reach(self.felt, [sizes[name] for name in STATE])
+        )
 
-    def astray(self, tube: Tube, lasting: Fraction = Fraction(0)) -> list[Fraction]:
+    def astray(self, tube: Tube, lasting: Fraction = ZERO, drift: list[Fraction] | None = None) -> list[Fraction]:
         """Return how far the rates are in a period from where the acceleration that is linear in the sample, and that of a
-        torque that is `lasting`, take them."""
+        torque that is `lasting`, take them, while they drift so far."""
         sizes = tube.region.sizes | {"v": 1 - tube.region.least}
         left = [most(p, sizes) for p in self.speeding]
-        columns = zip(left, reach(tube.bent, tube.drift), self.N, strict=True)
-        return [self.h * (a + b + (tube.push - lasting) * norm(n)) for a, b, n in columns]
+        columns = zip(left, reach(tube.bent, drift or tube.drift), self.N, strict=True)
+        return [self.h * (a + b + (tube.push + tube.late.moved - lasting) * norm(n)) for a, b, n in columns]
 
     def corners(self) -> list[Rows]:
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
@@ -370,10 +366,11 @@ class Held(Reader):
             change = 2 * self.changes(tube.sizes)["h"] / self.size("h")
             steady += change * self.apart[0] * stretch(self.loop.given) / h
             moved += change * (self.apart[1] + h / 4 * self.apart[0])
-        sizes = steady + 2 * grown, steady + 4 * grown, rolled + moved
+        at_ends, along = self.ends(tube)
+        sizes = steady + 2 * grown + at_ends[0], steady + 4 * grown + at_ends[1], rolled + moved + along
         return list(zip(self.ways, sizes, strict=True))
 
     def bend_between(self, tube: Tube) -> Fraction:
         """Return how far q is at most, between two samples, from the straight line between them."""
-        fastest, sizes = norm(tube.drift) / self.h + tube.stale * self.light, tube.sizes
+        fastest, sizes = norm(tube.drift) / self.h + (tube.stale + tube.late.most - tube.late.moved) * self.light, tube.sizes
         return self.h * self.h / 16 * (fastest + sizes[SPEED] ** 2 / 2 * sizes[ANGLE])

@@ -1,14 +1,18 @@
-"""How far errors of what a law is told take its torque from the one at the true state. Docs/kernel.md, 10."""
+"""How far errors of what a law is told take its torque from the one at the true state, and how fast changes what is around.
+Docs/kernel.md, 10."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 
 from .loops import AttitudeLoop
 from .numbers import norm, root
 from .polynomials import Poly
-from .regions import ANGLE, Region, Sizes, as_told, felt, stretch
+from .regions import ANGLE, SPEED, Region, Sizes, as_told, felt, stretch
+
+ZERO = Fraction(0)
 
 
 class Reader:
@@ -23,6 +27,12 @@ class Reader:
     hurried: Fraction
     change: list[Fraction] | None
     unlike: list[Poly]
+    h: Fraction
+    off: Fraction
+
+    def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
+        """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
+        raise NotImplementedError
 
     @cached_property
     def wrong(self) -> Sizes:
@@ -54,3 +64,35 @@ class Reader:
         """Return a bound of the norm of a vector from outside."""
         sizes = [x for name, x in self.others.items() if name[0] == letter]
         return norm(sizes) if letter == "e" else max(sizes, default=Fraction(0))
+
+    def load(self, sizes: Sizes, acceleration: Fraction) -> Fraction:
+        """Return how far the torque that the body takes is from that of the given inertia."""
+        w, r = sizes[SPEED], self.size("r")
+        return self.off * (acceleration + self.size("a") + w * r + (w + r) ** 2)
+
+    def changes(self, sizes: Sizes, turning: int = 1) -> dict[str, Fraction]:
+        """Return by how much target, momentum and torque from outside change in the mean of a period: those from nothing on;
+        the torque is at no time nearer than this to what the law is told. turning: 0 without what the body's own rate does
+        to momentum."""
+        e, r, a, H = (self.size(letter) for letter in "erah")
+        w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
+        turned = (turning * w + r) * H + e + outside
+        return {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * turned, "e": min(2 * e, self.gradual(sizes))}
+
+    def gradual(self, sizes: Sizes) -> Fraction:
+        """Return by how much a torque that is told changes in the mean of a period, or twice itself if it may at once."""
+        if self.change is None:
+            return 2 * self.size("e")
+        return self.h / 2 * (self.change[0] + self.change[1] * (sizes[SPEED] + self.size("r")))
+
+    def stale(self, sizes: Sizes, parts: list[Poly], turning: int = 1, letters: str = "raeh") -> Fraction:
+        """Return by how much parts change by that, or by some of it."""
+        changes = self.changes(sizes, turning)
+        return sum((felt(parts, letter, sizes) * changes[letter] for letter in letters), ZERO)
+
+    def unlike_body(self, sizes: Sizes, parts: Sequence[list[Poly]]) -> tuple[Fraction, Fraction]:
+        """Return `stale` of two parts, of which the second follows momentum that turns with the body as without pushes; and
+        what is more for each rate that pushes add until the end of a period."""
+        steady, turning = parts
+        calm = self.stale(sizes, steady) + self.stale(sizes, turning, 0)
+        return calm, felt(turning, "h", sizes) * self.h / 4 * self.size("h")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from typing import NamedTuple
 
 from .loops import AXES, RATES, TURNS
 from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, times, transpose, up, whole
@@ -46,13 +47,23 @@ class Region:
         return Region(X, self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()} | {PULL: pull}, self.least)
 
 
+class Behind(NamedTuple):
+    """By how much the torque is off by what is late: at any time, in the mean, and one that is held, moves the rates evenly,
+    and so does no less to what they do in a period."""
+
+    most: Fraction
+    mean: Fraction
+    moved: Fraction
+
+
 @dataclass(frozen=True)
 class Tube:
     """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
     drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time,
     and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time.
     Of what is held, `uneven` has not what errors that noise drives add linearly. `bent` bounds the slopes of the
-    gyroscopic acceleration in the rates."""
+    gyroscopic acceleration in the rates; `late`: the torque that is off by what is late; `end`: how far the rates drift to
+    the end, where `drift` is as in a motion that drifts evenly and does no less."""
 
     region: Region
     sizes: Sizes
@@ -63,10 +74,12 @@ class Tube:
     stale: Fraction
     uneven: Fraction
     bent: Rows
+    late: Behind
+    end: list[Fraction]
 
     @property
     def push(self) -> Fraction:
-        """Return the bound of all together, in the mean."""
+        """Return the bound of all together but what is late, in the mean."""
         return self.steady + self.pushed + self.stale
 
 

@@ -181,7 +181,9 @@ def as_part(module: ModuleType, path: Path | None = None) -> Part:
 def _check_equations(part: Part) -> None:
     """Raise ValueError for an equation, or a bound, that does not take the arguments of its role."""
     acts = part.role in ("actuator", "effector")
-    wanted = BOUNDS | BY_NUMBERS | {"error": ("params", "envelope") if acts else ("params",)}
+    wanted = (
+        BOUNDS | BY_NUMBERS | {"late": ("params", "period")} | {"error": ("params", "envelope") if acts else ("params",)}
+    )
     protocol: Any = getattr(roles, part.role.capitalize())
     declarations: dict[str, Any] = {**vars(protocol)}
     for name, declared in declarations.items():

@@ -146,6 +146,18 @@ class Push(NamedTuple):
     per_rate: float = 0.0
 
 
+class Late(NamedTuple):
+    """How what a part gives is late, in a loop of one control period. Let e be the command less what acts. In a period |e|
+    does not grow, is no more than `mean` times its first value in the mean, and `kept` times that in the end; then it
+    changes by as much as the command. All this while no component of e exceeds `most`. alike: e keeps its direction, and
+    falls exactly so."""
+
+    kept: float
+    mean: float
+    most: float = math.inf
+    alike: bool = False
+
+
 @dataclass(frozen=True)
 class Card:
     """Title, sources and assumptions of a part."""

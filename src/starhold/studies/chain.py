@@ -177,6 +177,9 @@ def _link(one: HandOver, before: str, after: str, last: Claim | None, claim: Cla
     if claim is not None and (angle == inf or early):
         fast = f" at up to {np.degrees(claim.numbers['rate_start']):.3g}°/s" if early else ""
         assumed.append(f"{after} begins within {np.degrees(claim.numbers['slew_angle']):.3g}° of its target{fast}")
+    if claim is not None and (late := claim.numbers.get("late_torque")):
+        # The next law may ask for another torque at once.
+        assumed.append(f"{after} begins with a torque within {late:.4g} N m of its command")
     assumed += [limited] if claim is not None and (limited := claim.limited_to(inf)) else []
     lacks = _lacking(before, after, claim, 0.0 if early else rate, angle)
     heavy = [] if claim is None else _heavy(after, claim, momentum)

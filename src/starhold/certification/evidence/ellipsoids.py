@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from starhold.certification.evidence.cones import interior_point
 from starhold.certification.evidence.sparse import entries_of
 from starhold.certification.matrices import floats
-from starhold.kernel.numbers import Rows
-from starhold.kernel.regions import RATE, TURN
+from starhold.kernel.held import Held
+from starhold.kernel.numbers import Rows, norm
+from starhold.kernel.regions import AT_REST, RATE, TURN, Radii, Tube
 
 linalg: Any = import_module("scipy.linalg")
 Array = NDArray[np.float64]
@@ -123,3 +124,18 @@ def top(a: Array, b: Array) -> float:
     if failed:
         raise np.linalg.LinAlgError("a matrix is not positive definite")
     return float(values[-1])
+
+
+def ends(motion: Held, tube: Tube, X: Rows, swayed: Radii = AT_REST) -> tuple[float, float]:
+    """Return bounds of the angle (rad) and the rate (rad/s) of motions, also between samples, that at samples are within
+    `swayed` of an ellipsoid."""
+    shape, drift = floats(X), float(norm(tube.drift))
+    wide, turned = (
+        sqrt(float(np.linalg.eigvalsh(shape[k, k])[-1])) + float(r) for k, r in zip((RATE, TURN), swayed, strict=True)
+    )
+    fastest = (wide + drift / 2.0) * MORE
+    sine = (turned + float(motion.bend_between(tube))) * MORE
+    half = sine
+    for _ in range(60):
+        half = sine + half**3 / 6.0
+    return 2.0 * half * MORE if half < 1.0 else inf, fastest

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.matrices import floats
 from starhold.certification.unmodelled import driven_errors, noisy_fields, samples_of
+from starhold.kernel.follower import steadied
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.theorems.noise import (
@@ -51,6 +52,9 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
     if noise is None:
         return None
     near, every, spins = near_target(wired, Fraction(loop.loop.period)), noise.recursion.every, spins_of(wired)
+    late = loop.known.late
+    if late is not None and late.alike:
+        near, _ = steadied(near, Fraction(loop.loop.period), Fraction(late.kept), Fraction(late.mean))
     errors = [linear(wired.claim, role) for role in (CARRIED, CORRECTED)]
     parts, shapes = parts_of(len(errors[0][0][0]), spins), list[Array]()
     widths = dict.fromkeys(parts, 0.0)

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.ellipsoids import HEED, MORE, highest_ratio, smallest
+from starhold.certification.evidence.ellipsoids import HEED, MORE, ends, highest_ratio, smallest
 from starhold.certification.evidence.finding import concluded, read
+from starhold.certification.evidence.lates import begun_late, numbers_of, of_late, resting, weighed
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
@@ -27,11 +28,11 @@ from starhold.certification.matrices import above, floats
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, Rows, demand, norm, plus, times, transpose
+from starhold.kernel.numbers import RefusedError, demand, plus, times, transpose
 from starhold.kernel.plans import Plan
-from starhold.kernel.regions import AT_REST, RATE, TURN, Radii, Tube, balls, widened
+from starhold.kernel.regions import AT_REST, TURN, Tube, balls, widened
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import ROUNDS, periods, spread
+from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread
 from starhold.kernel.theorems.response import first_of, responds
 from starhold.parts.craft import tensor
 
@@ -68,7 +69,7 @@ class Chain:
     motion: Held
     V: str
     level: float
-    tried: dict[Fraction, Lower | None] = field(default_factory=dict[Fraction, "Lower | None"])
+    tried: dict[Any, Lower | None] = field(default_factory=dict[Any, "Lower | None"])
     """The results of `lower`, for all chains of one V."""
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
@@ -87,10 +88,11 @@ class Chain:
 
     def of_level(self) -> dict[str, Any]:
         """Return the claim's numbers that follow from its level."""
+        late = of_late(self.motion.late)
         if self.motion.plan is None:
-            return {"level": self.level}
+            return {"level": self.level} | late
         off = self.motion.planned(self.motion.region(Fraction(self.level)).sizes)
-        return {"level": self.level, "plan.error": float(off) * MORE}
+        return {"level": self.level} | late | {"plan.error": float(off) * MORE}
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
@@ -101,21 +103,22 @@ class Chain:
             if end > c * Fraction(9, 10):
                 break
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
-            self.samples += periods(self.motion.h * beta, floor, c, end)
+            self.samples += periods(self.motion.h * beta, floor, c, end) + on_level(self.motion, end)[1]
             c = end
         return float(c)
 
     def lower(self, c: Fraction) -> Lower | None:
         """Return tau and beta for the lowest level proved to be reached from another, and that level."""
-        if c not in self.tried:
-            self.tried[c] = self.lowest(c)
-        return self.tried[c]
+        key = c, self.motion.late
+        if key not in self.tried:
+            self.tried[key] = self.lowest(c)
+        return self.tried[key]
 
     def lowest(self, c: Fraction) -> Lower | None:
         """Find what `lower` returns."""
         motion = self.motion
         try:
-            exact, above, felt, push, rest = motion.fall(motion.tube(motion.region(c)))
+            exact, above, felt, push, rest, spare = motion.fall(on_level(motion, c)[0])
         except RefusedError:
             return None
         Q, H, F = floats(exact), floats(above), floats(felt)
@@ -127,7 +130,7 @@ class Chain:
         def floor(share: float) -> tuple[float, float, float]:
             tau = largest * share
             beta = float(linalg.eigh(Q - tau * R, H, eigvals_only=True)[0]) * (1.0 - 1e-6)
-            beta = min(beta, (1.0 - 1e-6) / float(motion.h))
+            beta = min(beta, float(spare) * (1.0 - 1e-6) / float(motion.h))
             return ((float(push) ** 2 / (4.0 * tau) + float(rest)) / beta if beta > 0.0 else inf), tau, beta
 
         _, tau, beta = min(floor(share) for share in np.linspace(0.02, 0.98, 33))
@@ -138,28 +141,30 @@ class Chain:
 
     def tighten(self, tube: Tube) -> tuple[float, float]:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
-        angle, fastest = self.ends(tube, tube.region.X)
+        angle, fastest = ends(self.motion, tube, tube.region.X)
         heed, corners = HEED, self.motion.corners()
         away = self.motion.away
         for _ in range(ELLIPSOIDS):
-            pushes = self.motion.linear(tube)
+            within, more = forgotten(self.motion, tube)
+            pushes = self.motion.linear(within)
             sized = [floats(B) * float(b) for B, b in pushes]
             ellipsoid = smallest(floats(self.motion.near.A), np.array(list(map(floats, corners))), sized, heed)
             if ellipsoid is None:
                 break
             shape, shares = ellipsoid
             X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
-            more = spread(a, pushes)
-            moved = (plus(more, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
+            added = spread(a, pushes)
+            moved = (plus(added, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
             rate = max(highest_ratio(after, X) for after in moved)
-            reach = highest_ratio(widened(tube.region.X, away), X)
-            inner = self.motion.tube(tube.region.within(X, away))
-            end = self.ends(inner, X, away)
+            reach = highest_ratio(widened(within.region.X, away), X)
+            inner = self.motion.tube(within.region.within(X, away))
+            end = ends(self.motion, inner, X, away)
             if rate >= 1.0 or end[0] > angle * 0.99:
                 if not heed:
                     break
                 heed = 0.0
                 continue
+            self.samples += more
             self.ellipsoids.append(
                 {
                     "shape": [[str(x) for x in row] for row in X],
@@ -177,7 +182,7 @@ class Chain:
     def nearest(self) -> tuple[Chain, tuple[float, float]]:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
         (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
-        tube = self.motion.tube(self.motion.region(Fraction(self.levels[-1]["end"])))
+        tube, _ = on_level(self.motion, Fraction(self.levels[-1]["end"]))
         one = replace(self, ellipsoids=list[Any]())
         ends = [(one, one.respond(tube))]
         if not one.response or self.motion.loop.wheels:
@@ -188,34 +193,21 @@ class Chain:
         """Find how often the response brings motions nearer, and return the ultimate bounds."""
         motion, evidence = self.motion, find_response(self.motion)
         (begun, pulled), rounds = first_of(motion, tube), 0
-        angle, fastest = self.ends(tube, tube.region.X)
+        angle, fastest = ends(self.motion, tube, tube.region.X)
         response = None if evidence is None else concluded(responds(motion, evidence["weights"], evidence["gains"]))
         while evidence is not None and response is not None and rounds < ROUNDS:
             try:
-                begun, pulled, inner = response.after(motion, tube, begun, pulled)
+                within, more = forgotten(motion, tube)
+                begun, pulled, inner = response.after(motion, within, begun, pulled)
             except RefusedError:
                 break
-            end = self.ends(inner, balls(begun), motion.away)
+            end = ends(self.motion, inner, balls(begun), motion.away)
             if not end[0] < angle * 0.999:
                 break
             tube, (angle, fastest), rounds = inner, end, rounds + 1
-            self.samples += response.count
+            self.samples += response.count + more
             self.response = {"response": evidence | {"rounds": rounds}}
         return angle, fastest
-
-    def ends(self, tube: Tube, X: Rows, swayed: Radii = AT_REST) -> tuple[float, float]:
-        """Return bounds of the angle (rad) and the rate (rad/s) of motions, also between samples, that at samples are within
-        `swayed` of an ellipsoid."""
-        shape, drift = floats(X), float(norm(tube.drift))
-        wide, turned = (
-            sqrt(float(np.linalg.eigvalsh(shape[k, k])[-1])) + float(r) for k, r in zip((RATE, TURN), swayed, strict=True)
-        )
-        fastest = (wide + drift / 2.0) * MORE
-        sine = (turned + float(self.motion.bend_between(tube))) * MORE
-        half = sine
-        for _ in range(60):
-            half = sine + half**3 / 6.0
-        return 2.0 * half * MORE if half < 1.0 else inf, fastest
 
 
 def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float | None = None) -> bool:
@@ -224,7 +216,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
     like: the numbers of a claim, for the same start set and limits, and with noise if it includes noise."""
     if like is None:
         rates = dict.fromkeys((start_rate(loop.loop) * MORE if begun is None else begun, 0.0))
-        angles = list(map(radians, ANGLES if loop.plan is None else (*ANGLES, *NEAR)))
+        angles = list(map(radians, (*ANGLES, *NEAR) if loop.plan is not None or loop.known.late else ANGLES))
         beyond = list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
@@ -275,6 +267,7 @@ class Pushed:
         self.larger, self.refused = list[tuple[float, float, str]](), dict[tuple[Any, ...], str]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
+        self.numbers |= numbers_of(loop.known.late)
         self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
         if loop.plan is not None:
@@ -288,7 +281,7 @@ class Pushed:
         slow = sqrt(self.stiffness / self.J)
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
         self.leans = [
-            (float(f"{lean * slow:.4g}"), *self.sampled(float(f"{lean * slow:.4g}")), dict[Fraction, Lower | None]())
+            (float(f"{lean * slow:.4g}"), *self.sampled(float(f"{lean * slow:.4g}")), dict[Any, Lower | None]())
             for lean in LEANS
         ]
         # The locally best is tried first, and taken if it descends from the whole set.
@@ -301,6 +294,7 @@ class Pushed:
         motion = Held(wired, self.plan)
         self.plan = motion.plan
         motion.swayed, motion.apart = self.swayed, self.apart
+        motion.late = weighed(motion, self.scales)
         return V, motion
 
     def claim(self, V: str, numbers: dict[str, Any], **evidence: Any) -> dict[str, Any]:
@@ -359,9 +353,12 @@ class Pushed:
         numbers = self.numbers | limits
         numbers |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
         for epsilon, V, motion, tried in self.leans:
+            motion.late = begun_late(motion, sin(half), rate)
             rest = 2.0 * float(motion.s) * sin(angle / 4.0) ** 2
             rest += float(np.linalg.eigvalsh(floats(motion.G)[TURN, TURN])[-1]) * sin(half) ** 2
             level = rest + J * rate * (rate / 2.0 + epsilon * sin(half))
+            level += float(motion.late.weight * motion.late.begun**2) if motion.late else 0.0
+            motion.late = resting(motion, level * (1.0 + 1e-6))
             begun.append(Chain(motion, V, level * (1.0 + 1e-6), tried))
         if asks_more(begun[0].motion, begun[0].level, limits):
             loop.failed[POINTS] = "the torque exceeds its limit"

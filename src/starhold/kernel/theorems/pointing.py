@@ -4,13 +4,15 @@ are bounded, and motions from a large set come as near to the target as is told.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 
+from ..follower import FIRST, REST, WITHIN
 from ..held import Held
 from ..loops import AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim, Numbers
-from ..regions import ANGLE, AT_REST, RATE, TURN, as_told, balls, widened
+from ..regions import ANGLE, AT_REST, RATE, TURN, Tube, as_told, balls, widened
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
@@ -20,6 +22,9 @@ from .response import first_of, responds
 
 ROUNDS = 64
 """How often responses may be taken, each in the set that was found before."""
+
+NEARLY = Fraction(9, 8)
+"""How near to what it comes down to is counted what is late."""
 
 HALF_TURN = Fraction(314, 100)
 """At most a half turn (rad)."""
@@ -43,17 +48,28 @@ def points(claim: Claim) -> Proof:
     c, h = numbers["level"], motion.h
     starts = [numbers.get(name) or Fraction(0) for name in ("angle", "start.angle")]
     demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
-    start = yield from contents(loop, loop.lyapunov)
+    # What is late is in the set from the beginning.
+    behind = motion.late.weight * motion.late.begun**2 if motion.late else Fraction(0)
+    demand(behind < c or not behind, "what is late in the beginning is beyond the level")
+    start = yield from contents(loop, loop.lyapunov + behind)
     region = motion.region(c)
     planned, torques = "", None
     if motion.plan is not None:
         wrong = motion.wrong
         planned, torques = yield from motion.plan.keeps(region, (wrong["w"], wrong["q"]), as_told(region.sizes, wrong))
     off = motion.misread(region)[0] + motion.planned(region.sizes)
+    behind_at_most = motion.behind(region.sizes).most
+    if WITHIN in numbers or motion.steady is None:
+        # Its components change one by one, not towards what is asked for.
+        off += behind_at_most
+    if WITHIN in numbers:
+        yield "torque that follows", Exceeds(numbers[WITHIN], behind_at_most)
     limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques)
     if loop.signs:
         yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
     tube = motion.tube(region)
+    if motion.late and (change := motion.change_in(tube)):
+        yield "late torque", Exceeds(motion.late.rest, change.settled(tube, False))
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * motion.swing(tube))
     noise = Statement("", ())
     demand(motion.random == 0 or (SHARE in numbers and DEVIATION in numbers), "a random torque has no share")
@@ -64,18 +80,21 @@ def points(claim: Claim) -> Proof:
     within = [(Fraction(0), tube.sizes[ANGLE])]
     for k, one in enumerate(levels):
         end, tau, beta = map(rational, read_table(one, "end", "tau", "beta"))
-        demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
-        Q, H, F, push, rest = motion.fall(tube)
+        Q, H, F, push, rest, spare = motion.fall(tube)
+        demand(tau > 0 and 0 < h * beta <= spare and 0 < end < c, "a level is not properly told")
         pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(F), F), -tau), H, -beta)
         yield f"V decreases by a share {k}", Definite(fallen)
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
-        c, tube = end, motion.tube(motion.region(end))
+        c, (tube, more) = end, on_level(motion, end)
+        samples += more
         within.append((h * samples, tube.sizes[ANGLE]))
     last, beside, corners = tube.region.X, AT_REST, motion.corners()
     away = motion.away
     for k, one in enumerate(ellipsoids):
+        tube, more = forgotten(motion, tube)
+        samples += more
         shape, parts, *rest = read_table(one, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares, Fraction(0))
@@ -94,6 +113,8 @@ def points(claim: Claim) -> Proof:
         response = yield from responds(motion, weights, gains)
         radii, pulled = first_of(motion, tube)
         for _ in range(rounds):
+            tube, more = forgotten(motion, tube)
+            samples += more
             radii, pulled, tube = response.after(motion, tube, radii, pulled)
             samples += response.count
             within.append((h * samples, tube.sizes[ANGLE]))
@@ -109,7 +130,12 @@ def points(claim: Claim) -> Proof:
 
     misread = [("attitude that it is told", motion.turned, "rad"), ("rate", motion.rated, "rad/s")]
     misread += [("target's rate", motion.led, "rad/s"), ("target's acceleration", motion.hurried, "rad/s2")]
-    text = bounded_motion(numbers, "V <= " + below(numbers["level"]) + ", q0 > 0" * motion.even, "", misread)
+    begun = "V <= " + below(numbers["level"] - behind) + ", q0 > 0" * motion.even
+    text = bounded_motion(numbers, begun, "", misread)
+    text += f", the torque that acts late, {motion.late.in_words}" if motion.late else ""
+    if motion.steady:
+        text += f", in all components alike, and by no less than {' and '.join(map(above, motion.alike))} times"
+    text += f", at no time by {above(numbers[WITHIN])} N m" if WITHIN in numbers else ""
     text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
     text += f", with every J_ik off by up to {below(numbers['tolerance'])} sqrt(J_ii J_kk)" if motion.off else ""
     text += f", {planned}" * bool(planned)
@@ -123,7 +149,8 @@ def points(claim: Claim) -> Proof:
         *noise.assumptions,
         *limited.assumptions,
     ]
-    assumed += ["best-plan"] * bool(planned)
+    assumed += ["best-plan"] * bool(planned) + ["late-torque"] * bool(motion.late)
+    assumed += ["late-alike"] * bool(motion.steady)
     assumed += loop.untold + ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
@@ -158,6 +185,28 @@ def spread(shares: Sequence[Fraction], pushes: Sequence[tuple[Rows, Fraction]]) 
     for (B, b), share in zip(pushes, shares, strict=True):
         grown = plus(grown, times(B, transpose(B)), b * b / share)
     return grown
+
+
+def on_level(motion: Held, c: Fraction) -> tuple[Tube, int]:
+    """Return the tube of a level from when what was late before is forgotten, and after how many periods that is."""
+    tube, samples = motion.tube(motion.region(c)), 0
+    for _ in range(2 * bool(motion.late)):
+        tube, more = forgotten(motion, tube, False)
+        samples += more
+    return tube, samples
+
+
+def forgotten(motion: Held, tube: Tube, whole: bool = True) -> tuple[Tube, int]:
+    """Return the tube from when what was late in larger sets is forgotten, or the b of it, and after how many periods that
+    is."""
+    if (change := motion.change_in(tube, whole)) is None:
+        return tube, 0
+    sizes, floor = tube.region.sizes, change.settled(tube, whole, motion.leant)
+    linear = motion.steady_part(tube) if whole else Fraction(0)
+    begun, end = sizes[REST] + whole * (sizes[FIRST] + linear), NEARLY * floor
+    samples = periods(1 - change.kept, floor, begun, end) if end < begun else 0
+    sizes = sizes | {REST: min(begun, end), FIRST: linear if whole else sizes[FIRST]}
+    return motion.tube(replace(tube.region, sizes=sizes)), samples
 
 
 def periods(fall: Fraction, floor: Fraction, start: Fraction, end: Fraction) -> int:

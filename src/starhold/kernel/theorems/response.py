@@ -48,7 +48,7 @@ class Response:
         from what they were before. What momentum makes of z is a push here."""
         away, swayed, region_sizes = motion.away, motion.swayed, tube.region.sizes
         first, last, turn = (b for _, b in motion.linear(tube, begun[0], pulled))
-        pushes = first, last - first, turn
+        pushes = first, max(last - first, Fraction(0)), turn
         sizes = [min(region_sizes[name] + away[i // 3], begun[i // 3]) for i, name in enumerate(STATE)]
         wide, turned, pulled = (
             up(sum((gain * b for gain, b in zip(gains, pushes, strict=True)), norm(reach(self.left[part], sizes))))

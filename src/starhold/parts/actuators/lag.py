@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, clip_axes, scale, subtract
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Late, Parameter
 
 CARD = Card(
     title="First-order lag",
@@ -36,6 +36,12 @@ def rates(output: Vector, target: Vector, begun: Vector, substep: Scalar, params
 def fastest(params: Params) -> float:
     """Return the fastest rate (1/s) at which it settles, which the integration must resolve."""
     return 1.0 / params.lag
+
+
+def late(params: Params, period: float) -> Late:
+    """How late the output is: its distance from the command falls exponentially, while it is within the rate limit."""
+    kept = math.exp(-period / params.lag)
+    return Late(kept, params.lag / period * -math.expm1(-period / params.lag), params.lag * params.rate_limit, alike=True)
 
 
 def examples() -> list[Params]:

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, clip_axes, scale, subtract
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Late, Parameter
 
 CARD = Card(
     title="Rate limit",
@@ -28,6 +28,11 @@ def rates(output: Vector, target: Vector, begun: Vector, substep: Scalar, params
     """Return d(output)/dt: the straight line from the output at the start of the substep to the command, or as far towards
     it as the limit allows."""
     return clip_axes(scale(1.0 / substep, subtract(target, begun)), params.rate_limit)
+
+
+def late(params: Params, period: float) -> Late:
+    """How late the output is: it comes to the command along a straight line within the control period, if it may."""
+    return Late(0.0, 0.5, params.rate_limit * period)
 
 
 def examples() -> list[Params]:

@@ -1,0 +1,84 @@
+"""Finds the weight of a torque that is late, beside V, and how late it is in the beginning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from starhold.certification.evidence.squares import rounded
+from starhold.certification.evidence.terms import valued
+from starhold.certification.matrices import floats
+from starhold.kernel.follower import LATE, Late
+from starhold.kernel.held import Held
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.regions import RATE, STATE, TURN
+from starhold.parts import contract
+
+DIGITS, STARTS, BEYOND = 7, 500, 1.02
+"""The digits of numbers; how many starts are tried, and the margin for others."""
+MARGINS = (1.05, 1.05, 1.05, 1.1)
+"""By how much each bound of a part is larger than what follows from the one before."""
+LEAST = 1.0 - 4e-6
+"""How exactly it is known at least how late something is."""
+WEIGHT = 0.9
+"""The weight with which what is late costs V the least, where it does so by the product of two forms."""
+
+
+def numbers_of(late: contract.Late | None) -> dict[str, float]:
+    """Return the numbers of a claim about a torque that is late, before its weight is known."""
+    if late is None:
+        return {}
+    numbers = {"kept": late.kept, "mean": late.mean, "most": late.most, "weight": 1.0, "begun": 0.0, "rest": 0.0}
+    if late.alike:
+        numbers |= {"kept.least": late.kept * LEAST, "mean.least": late.mean * LEAST}
+    return {LATE + name: x for name, x in numbers.items() if isfinite(x)}
+
+
+def of_late(late: Late | None) -> dict[str, Fraction]:
+    """Return the numbers of a claim that are chosen for a motion."""
+    return {LATE + name: getattr(late, name) for name in ("weight", "begun", "rest") if late is not None}
+
+
+def weighed(motion: Held, scales: Mapping[str, float]) -> Late | None:
+    """Return how late the torque is with the weight with which it costs V about the least near the target, where rates and
+    turns are of these sizes."""
+    scale: Any = np.array([scales[name] for name in STATE])
+    change = motion.change_in(motion.tube(motion.region((motion.s + motion.G[3][3]) / 2**20)))
+    if motion.late is None or change is None:
+        return None
+    work, moved = (float(np.linalg.norm(floats(rows) * scale, 2)) for rows in (motion.felt, change.M))
+    return replace(motion.late, weight=rounded(WEIGHT * float(motion.h * motion.late.mean) * work / moved, DIGITS))
+
+
+def begun_late(motion: Held, turn: float, rate: float) -> Late | None:
+    """Return how late the torque is at the start, from up to a turn (the sine of half the angle) and a rate (rad/s): if it
+    begins with none it is off by what the law asks for."""
+    if motion.late is None:
+        return None
+    r, names = np.random.default_rng(1), ["q0", *STATE[TURN], *STATE[RATE]]
+    along, axes = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2, 3, STARTS)))
+    x = dict(zip(names, (np.full(STARTS, np.sqrt(max(1.0 - turn**2, 0.0))), *(turn * axes), *(rate * along)), strict=True))
+    around = {name: float(most) * r.choice((-1.0, 1.0), STARTS) for name, most in motion.others.items()}
+    torques = [valued(p, x | around) for p in motion.loop.u]
+    return replace(motion.late, begun=rounded(float(np.linalg.norm(torques, axis=0).max()) * BEYOND, DIGITS))
+
+
+def resting(motion: Held, level: float) -> Late | None:
+    """Return how late the torque is with what its part that no weight pays for is at most in {V <= level}; where that is not
+    bounded, with none."""
+    if motion.late is None:
+        return None
+    late = unrested = motion.late = replace(motion.late, rest=Fraction(0))
+    try:
+        for more in MARGINS:
+            tube = motion.tube(motion.region(Fraction(level)))
+            if change := motion.change_in(tube):
+                late = motion.late = replace(late, rest=rounded(float(change.settled(tube, False)) * more, DIGITS))
+    except RefusedError:
+        return unrested
+    return late
