@@ -196,6 +196,12 @@ def test_files_stay_short():
         assert len(path.read_text(encoding="utf-8").splitlines()) <= 400, path
 
 
+def test_names_that_only_type_checkers_import_are_in_annotations_that_nothing_evaluates():
+    for path in (ROOT / "src").rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert "if TYPE_CHECKING:" not in text or "from __future__ import annotations" in text, path
+
+
 def commands():
     """What the overview lists, as printed, without what follows the sign of a comment."""
     listed = re.search(r"run as printed:\n\n```\n(.*?)```", read("docs/index.md"), flags=re.DOTALL)

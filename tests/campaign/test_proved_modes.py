@@ -67,6 +67,7 @@ def test_flights_are_compared_with_the_claim_of_their_last_mode_from_when_it_beg
     assert (second.begun >= 0).any()
 
 
+@pytest.mark.slow
 def test_a_fault_that_the_law_knows_of_begins_other_claims():
     fault = {"time": 30.0, "inertia": [2.1, 3.0, 4.0], "action": "reallocate"}
     scenario = mission(fault=[fault], initial={"attitude": [1.0, 0.05, 0.0, -0.03]})

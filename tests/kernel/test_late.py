@@ -79,6 +79,7 @@ def test_the_kernel_refuses_other_numbers_with_the_evidence(name, factor):
         check(edited(claim, **{key: str(Fraction(claim.proof.claim["numbers"][key]) * Fraction(factor))}))
 
 
+@pytest.mark.slow
 def test_the_kernel_refuses_a_lag_that_nothing_limits_or_that_is_told_in_part():
     _, claim, _ = flying("rate-limit", 0.1)
     assert check(edited(claim))

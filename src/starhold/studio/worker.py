@@ -1,5 +1,7 @@
 """Does one job of the studio in a separate process: reports its progress and result, and writes its files to a folder."""
 
+from __future__ import annotations
+
 import shutil
 import time
 import traceback
