@@ -145,7 +145,7 @@ def test_a_sheet_is_written_filled_in_and_judged(tmp_path):
     assert [row["seen"] for row in csv.DictReader(io.StringIO(judged))] == [row["expected sign"] for row in rows]
     assert "of 162 rows are empty" in judge(4, lambda row: row["expected sign"] if row["axis"] == "x" else "").stdout
     small = judge(4, lambda row: float(row["expected value"]) / (57.3 if row["stage"] == "gyro: rate" else 1.0)).stdout
-    assert "gyro: rate: 0.017 times the size" in small
+    assert "gyro: rate: 0.017 times the expected magnitude" in small
     wheels = simulated(sheet_of("cubesat-nadir"), [Mistake(sheet_of("cubesat-nadir").stages[5], 1)])
     values = iter(wheels)
     assert "A sign is wrong. wheels, by wheel: 1 reversed." in judge(3, lambda row: next(values)).stdout

@@ -91,15 +91,13 @@ def test_shares_are_what_the_bound_without_each_source_lacks(held):
 
 
 @pytest.mark.slow
-def test_a_source_that_the_claim_leaves_out_has_no_share():
-    """Of a random torque no bound is known."""
+def test_a_random_torque_is_in_the_claim_with_its_share():
     scenario = sh.scenario(HELD | {"environment": {"torque_noise": 1e-7}, "part": [PUSH]})
     without = {"push": {"part.constant-torque": None}, "noise": {"environment.torque_noise": 0.0}}
     others = {name: partial(loop_of, scenario.with_(changes)) for name, changes in without.items()}
     proof = prove_pointing(scenario, loop_of(scenario), others)
-    assert proof.left_out == ("environment random-torque",)
-    assert proof.shares["noise"] is None
-    assert proof.shares["push"] > 0.0
+    assert proof.left_out == ()
+    assert min(proof.shares.values()) > 0.0
 
 
 def test_what_is_not_proved_is_told_with_the_reason():
@@ -136,14 +134,16 @@ def plotted(**initial):
 
 
 @pytest.mark.slow
-def test_the_page_draws_the_bound_above_a_flight_that_begins_in_the_set_and_no_other():
+def test_the_page_draws_the_bound_above_a_flight_from_when_it_is_in_the_set():
     times, flown, ((number, since, most),) = plotted(angles=["10 deg", 0, 0])
     bound = most[np.searchsorted(since, times, side="right") - 1]
     assert number == 0
     assert since[0] == 0.0
     assert np.count_nonzero(since < 300.0) > 3
     assert (flown <= bound).all()
-    assert plotted(angles=["100 deg", 0, 0])[2] == ()
+    # One that begins outside has it from when it is in the set.
+    ((_, since, _),) = plotted(angles=["179 deg", 0, 0])[2]
+    assert since[0] > 0.0
 
 
 @pytest.mark.slow

@@ -185,7 +185,7 @@ def test_wheels_bound_torque_and_momentum():
     with pytest.raises(sh.InputError, match="N m s that the wheels can store allow about"):
         sh.scenario(tables | {"wheels": wheels | {"momentum_limit": 0.05}, "law": [asked("lyapunov", 200)]})
     with pytest.raises(sh.InputError, match="N m of torque allow about"):
-        sh.scenario(tables | {"wheels": wheels | {"momentum_limit": 50.0}, "law": [asked("lyapunov", 40)]})
+        sh.scenario(tables | {"wheels": wheels | {"momentum_limit": 50.0, "inertia": 0.1}, "law": [asked("lyapunov", 40)]})
 
 
 BAND = {"form": "bandwidth", "bandwidth": 1, "switching_gain": 1, "damping": 0.5}
