@@ -155,13 +155,15 @@ def unloaded(params, random, field_error, momentum, count):
 @pytest.mark.parametrize("limited", leading([1, 0]))
 @pytest.mark.parametrize(
     ("gain", "field_error", "momentum", "reached"),
-    [
-        (3e-4, 0.0, 5e-3, 0.8),
-        (3e-4, 2e-6, 5e-3, 0.4),
-        (3e-4, 6e-5, 5e-3, 0.1),
-        (0.05, 0.0, 5e-3, 0.3),
-        (0.05, 3e-5, 1.0, 0.4),
-    ],
+    leading(
+        [
+            (0.05, 3e-5, 1.0, 0.4),
+            (3e-4, 0.0, 5e-3, 0.8),
+            (3e-4, 2e-6, 5e-3, 0.4),
+            (3e-4, 6e-5, 5e-3, 0.1),
+            (0.05, 0.0, 5e-3, 0.3),
+        ]
+    ),
 )
 def test_unloading_keeps_what_it_says(gain, field_error, momentum, reached, limited):
     params = magnetic_unloading.Params(
