@@ -80,10 +80,10 @@ def test_a_claim_without_a_told_torque_is_about_no_loop_that_is_told_one(tmp_pat
     content = certificate(recorded.programs, recorded.claims)
     (proved,) = check(text(content))
     assert "untold-torque" in proved.statement.assumptions
-    assert "the law is told of no torque from outside" in proved.statement.written()
+    assert "the law is given no torque from outside" in proved.statement.written()
     (claim,) = content["claims"]
     assert differences(claim, quiet) == []
-    assert differences(claim, pulled) == ["its law is told of a torque from outside"]
+    assert differences(claim, pulled) == ["its law is given a torque from outside"]
     _, angles = flown(pulled, 12000)
     assert angles[8000:].max() > 100.0 * float(proved.claim.numbers["end.angle"])
 
@@ -110,7 +110,7 @@ def test_flights_tell_that_a_law_is_told_of_a_torque(tmp_path):
         loop = loop_of(tmp_path, ALL, **tables)
         run, _ = flown(loop, 2)
         ((where, how),) = ASSUMPTIONS["untold-torque"].unmet(Span(loop, run))
-        assert (where, how) == (violated, "the law is told of a torque from outside")
+        assert (where, how) == (violated, "the law is given a torque from outside")
 
 
 def test_the_other_quaternion_is_outside_the_set_of_an_odd_law_with_an_even_v(tmp_path):

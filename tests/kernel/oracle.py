@@ -395,3 +395,8 @@ class Oracle(Driven):
             if k > steps and ((turn(q) > n["end.angle"]).any() or (np.linalg.norm(w, axis=0) > n["end.rate"]).any()):
                 return False
         return True
+
+
+def is_kept(content, claim):
+    """Whether nothing in twelve tries breaks a claim: what is asked of a changed certificate that the kernel accepts."""
+    return Oracle(content, claim).holds(12)

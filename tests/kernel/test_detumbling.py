@@ -184,7 +184,7 @@ def told_of(measurement, gains, craft, memory):
 @pytest.mark.parametrize("law", [led, told_of])
 def test_a_law_that_is_told_of_more_than_the_field_is_refused(law):
     """Where nothing is told of it is the law of the claim, and the claim does not assume that."""
-    with pytest.raises(RefusedError, match="told of more than the field"):
+    with pytest.raises(RefusedError, match="given more than the field"):
         check(text(with_law(law)))
 
 

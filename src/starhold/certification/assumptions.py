@@ -141,7 +141,7 @@ def _pulled(span: Any) -> Unmet:
 
 def _told(span: Any) -> Unmet:
     modelled = any(fitted.part.flag("MODELLED") for fitted in span.loop.used("environment"))
-    return [(modelled, "the law is told of a torque from outside")]
+    return [(modelled, "the law is given a torque from outside")]
 
 
 def _unsure(span: Any) -> Unmet:
@@ -191,7 +191,7 @@ ASSUMPTIONS = {
     "no-wheels": Assumption("no stored momentum"),
     "no-outside-torque": Assumption("no torque from outside", _pulled),
     "known-outside-torque": Assumption("no torque from outside but what the law cancels", _uncancelled),
-    "untold-torque": Assumption("a law that is told of no torque from outside", _told),
+    "untold-torque": Assumption("a law that is given no torque from outside", _told),
     "bounded-outside-torque": Assumption("torque from outside bounded on each axis"),
     "changing-outside-torque": Assumption("torque from outside told as at the attitude told, its rate bounded"),
     "unknown-outside-torque": Assumption("torque from outside bounded in norm"),

@@ -217,6 +217,6 @@ def _words(claim: Mapping[str, Any], loop: Loop) -> Iterator[str]:
     if theorem != SAMPLED and (WHEELS in taken) != (loop.loop.wheels is not None):
         yield "only one of the two has wheels"
     if theorem in BOUNDED and OUTSIDE not in taken and any(loop.known.modelled) and loop.is_told(TOLD_TORQUE):
-        yield "its law is told of a torque from outside"
+        yield "its law is given a torque from outside"
     if WHEELS in taken and loop.loop.wheels is not None and not gives_allocated_torque(loop.loop.wheels):
         yield "its wheels do not give the torque that is allocated to them"

@@ -3,6 +3,7 @@ Docs/kernel.md, 10."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
@@ -15,7 +16,7 @@ from .regions import ANGLE, SPEED, Region, Sizes, as_told, felt, stretch
 ZERO = Fraction(0)
 
 
-class Reader:
+class Reader(ABC):
     """A loop whose law is told the attitude, the rate and others with errors: of these noise drives a part."""
 
     loop: AttitudeLoop
@@ -30,9 +31,9 @@ class Reader:
     h: Fraction
     off: Fraction
 
+    @abstractmethod
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
-        raise NotImplementedError
 
     @cached_property
     def wrong(self) -> Sizes:

@@ -21,7 +21,7 @@ ASSUMPTIONS = {
     "known-outside-torque": "a torque from outside is as the law is told",
     "bounded-outside-torque": "a torque from outside is at most as told",
     "changing-outside-torque": "a torque from outside is told as at the attitude told, and changes no faster than told",
-    "untold-torque": "the law is told of no torque from outside",
+    "untold-torque": "the law is given no torque from outside",
     "bounded-push": "torques from outside and errors of the command are no larger than told",
     "held-torque": "the torque is what the law asks for at the last sample, and the error",
     "late-torque": "the torque that acts is off by e, which nears 0 in a period, and then changes with what is asked for",

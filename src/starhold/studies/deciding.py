@@ -52,7 +52,7 @@ IDEAL = {
     FRICTIONLESS: "the friction of the wheels",
     "settled-estimate": "the time until the estimate has settled",
 }
-"""What a claim leaves out besides parts, by its assumption."""
+"""The text of what a claim leaves out besides parts, by the assumption that stands for it."""
 MARGINS = {
     "gain_margin": "gain",
     "lower_gain_margin": "less",

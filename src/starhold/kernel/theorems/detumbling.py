@@ -89,7 +89,7 @@ def opposes_change(loop: AttitudeLoop) -> Shown:
     b, before, subject = variables("b"), variables("m"), loop.claim.subject
     # Of what else a law may be told a loop that is taken with nothing has less than one that flies.
     fields = {name.rpartition(".")[0] for name in loop.claim.programs["law"].inputs if name.startswith("measurement.")}
-    demand(fields <= {"measurement", "measurement.magnetic_field"}, "the law is told of more than the field")
+    demand(fields <= {"measurement", "measurement.magnetic_field"}, "the law is given more than the field")
     square, gain = dot(b, b), -subject["gains.k"] / subject["measurement.period"]
     for name, known in (("first torque", 0), ("torque", 1)):
         outputs = loop.read("law", 7, wired("memory.field", before) | {"memory.known": poly(known)})
