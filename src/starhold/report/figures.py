@@ -281,7 +281,9 @@ def encoded(pixels: NDArray[np.uint8], dpi: float, level: int) -> bytes:
         (b"IDAT", zlib.compress(rows.tobytes(), level)),
         (b"IEND", b""),
     )
-    sealed = (struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in parts)
+    sealed = (
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in parts
+    )
     return b"\x89PNG\r\n\x1a\n" + b"".join(sealed)
 
 
