@@ -135,7 +135,8 @@ def test_nothing_is_taken_apart_at_the_end(tmp_path):
     code += "from starhold.cli.main import main; sys.argv = ['starhold', '--help']; main()"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert (done.stdout.splitlines()[-1], done.returncode) == ("ended", 0)
-    assert "Usage: " in done.stdout and "deleted" not in done.stdout
+    assert "Usage: " in done.stdout
+    assert "deleted" not in done.stdout
 
 
 @pytest.mark.slow

@@ -96,12 +96,12 @@ RANGES = [[0.25, 1.0], [1e5 + 1e-7, 1e5 + 3e-7], [2e-9, 4e12], [2e-3, 5e-3]]
 )
 def test_ticks_say_in_plain_text_what_their_formulas_say(log: bool, values: list[float]) -> None:
     texts = list[list[str]]()
-    for plain in (True, False):
+    for in_plain_text in (True, False):
         figure = Figure()
         axis = figure.subplots()
         axis.plot([0.0, 1.0], values)
         axis.set_yscale("log" if log else "linear")
-        if plain:
+        if in_plain_text:
             label_ticks(axis.yaxis, log)
         elif not log:
             axis.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
@@ -139,8 +139,8 @@ def test_an_axis_is_drawn_as_matplotlib_draws_it(log: bool, values: list[float],
         figure.savefig(file, format="png")
         drawn.append((np.asarray(Image.open(file)), np.asarray(Image.open(BytesIO(png(figure))))))
     # A file also has the pixels of the library's own.
-    (first, again), (other, last) = drawn
-    assert (first == again).all() and (first == other).all() and (first == last).all()
+    first = drawn[0][0]
+    assert all((one == first).all() for pair in drawn for one in pair)
     assert (first[..., :3] < 128).any()
 
 

@@ -269,8 +269,8 @@ def png(figure: Any, level: int = 6) -> bytes:
 
 
 def encoded(pixels: NDArray[np.uint8], dpi: float, level: int) -> bytes:
-    """Return pixels (height, width, 4) as the bytes of a PNG file. Rows are compressed unfiltered: filters chosen row by row,
-    as libraries choose them, take five times as long, and curves on white are hardly smaller for it."""
+    """Return pixels (height, width, 4) as the bytes of a PNG file. Rows are compressed unfiltered: filters chosen row by
+    row, as libraries choose them, take five times as long, and curves on white are hardly smaller for it."""
     height, width = pixels.shape[:2]
     rows = np.zeros((height, 1 + 4 * width), np.uint8)
     rows[:, 1:] = pixels.reshape(height, 4 * width)
