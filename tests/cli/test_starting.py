@@ -180,6 +180,7 @@ def assert_light(modules):
 def test_what_tells_of_the_program_loads_next_to_nothing(option, tmp_path):
     said, modules = loaded(tmp_path, [option])
     assert said.startswith("starhold " if option == "--version" else "Usage: ")
+    assert "..." not in said.partition("Commands:")[2]
     assert_light(modules)
 
 

@@ -17,7 +17,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from starhold.cli import commands
-from starhold.cli.arguments import INTERNAL_ERROR, USER_ERROR
+from starhold.cli.arguments import INTERNAL_ERROR, USER_ERROR, clause
 from starhold.cli.process import Outlet, on_signal, open_outlets
 from starhold.errors import InputError, InterruptedByUserError
 
@@ -32,9 +32,11 @@ def make_app(every: Mapping[str, Any]) -> typer.Typer:
     )
     for name, command in every.items():
         if isinstance(command, typer.Typer):
-            made.add_typer(command, name=name)
+            for one in command.registered_commands:
+                one.short_help = clause(one.callback.__doc__ or "")
+            made.add_typer(command, name=name, short_help=clause(str(command.info.help)))
         else:
-            made.command(name)(command)
+            made.command(name, short_help=clause(command.__doc__ or ""))(command)
     made.callback(invoke_without_command=True)(_root)
     return made
 
