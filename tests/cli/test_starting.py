@@ -94,6 +94,8 @@ def test_the_table_waits_for_nothing_that_it_does_not_need(words, loops, recorde
     assert end["drawn"] == sorted(["report.html", *(f"{name}.png" for name in PICTURES)])
     # One draws, one times the laws' calls.
     assert end["processes"] == 2
+    assert "concurrent.futures" not in table["modules"] or loops > 1
+    assert "numpy.ma" not in end["modules"]
     assert not {"matplotlib", "plotly", "sympy", "xarray", "pandas"} & packages(end["modules"])
     assert not {"scipy.optimize", "scipy.sparse", "scipy.special", "scipy.stats"} & {*end["modules"]}
     # Proofs begin after the table, and of SciPy need what multiplies and factors matrices alone.
