@@ -88,8 +88,8 @@ class Ticks(Artist):
             axis.label.set_position((x, outside) if level else (outside, y))
             axis.label.draw(renderer)
         if power := axis.major.formatter.get_offset():
-            x, pad = axis.offsetText.get_position()[0], axis.OFFSETTEXTPAD * dots
-            axis.offsetText.set_position((x, edge - pad if level else axis.axes.bbox.ymax + pad))
+            (x, _), box, pad = axis.offsetText.get_position(), axis.axes.bbox, axis.OFFSETTEXTPAD * dots
+            axis.offsetText.set_position((x, min(edge, box.ymin) - pad if level else box.ymax + pad))
             axis.offsetText.set_text(power)
             axis.offsetText.draw(renderer)
 
@@ -108,7 +108,7 @@ def _draw_ticks(renderer: Any, tick: Any, places: NDArray[np.float64], labels: l
     text = tick.label1
     if not text.get_visible() or not any(labels):
         return math.inf
-    font = text.get_fontproperties()
+    font = text.get_fontproperties().copy()
     context = renderer.new_gc()
     context.set_foreground(text.get_color())
     # The layout of `matplotlib.text.Text`: a line is at least as tall as "lp".
@@ -128,10 +128,11 @@ def _draw_ticks(renderer: Any, tick: Any, places: NDArray[np.float64], labels: l
 
 def _extent(renderer: Any, words: str, font: Any) -> tuple[float, float, float]:
     """Return width, height and descent (pixels) of a line of text."""
-    key = words, font.get_size(), renderer.dpi
+    key = words, font, renderer.dpi
     if key not in _extents:
         _extents[key] = renderer.get_text_width_height_descent(words, font, False)
     return _extents[key]
 
 
-_extents: dict[tuple[str, float, float], tuple[float, float, float]] = {}
+_extents: dict[tuple[str, Any, float], tuple[float, float, float]] = {}
+"""Sizes of lines of text in pixels, by text, font and dots per inch, since many figures have the same labels."""
