@@ -2,18 +2,15 @@
 
 import re
 
-import pandas as pd
 import pytest
 
 import starhold as sh
-from starhold.campaign import lanes as lane_making
 from starhold.campaign.campaign import begin, with_campaign
 from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.studies.body import study_of
 from starhold.studies.compare import compare, record
 from tests.campaign.flown import SMALL, fly, normal, short, uniform
-from tests.tiers import leading
 
 INERTIA = normal("4 %", relative=True)
 LIMIT = uniform(0.05, 0.2)
@@ -69,17 +66,6 @@ CASES = {
         {"wheel[2].axis[1]": normal(0.02), "wheels.inertia": INERTIA},
     ),
 }
-
-
-@pytest.mark.parametrize("case", leading(CASES))
-def test_the_runs_are_those_of_their_own_scenarios_however_they_are_made(case, monkeypatch):
-    laws, tables, over = CASES[case]
-    scenario = turn(laws, **tables)
-    found = fly(scenario=scenario, over=over, requirement=[], runs=10)
-    for law in found.laws:
-        assert found.again(7, law.law).differs == ()
-    monkeypatch.setattr(lane_making.Lanes, "_agrees", lambda *_: False)
-    pd.testing.assert_frame_equal(found.frame(), fly(scenario=scenario, over=over, requirement=[], runs=10).frame())
 
 
 def test_gains_stay_designed_for_the_nominal_craft():
