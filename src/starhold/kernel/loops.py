@@ -201,7 +201,7 @@ class AttitudeLoop(Loop):
 
     @cached_property
     def law(self) -> list[Piecewise]:
-        """Return the torque demanded by the law, case by case; for a law with a memory, without the memory's contribution."""
+        """Return the torque demanded by the law, case by case; for a law with a memory, without what the memory adds."""
         if self.added is None:
             return self.read("law", 3)
         program = self.claim.programs["law"]

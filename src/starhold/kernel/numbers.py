@@ -206,7 +206,7 @@ def beside(a: Rows, b: Rows) -> Rows:
 
 
 def cosine_below(angle: Fraction) -> Fraction:
-    """Return a lower bound of the cosine of an angle from 0 to 3: its alternating series, truncated after a negative term."""
+    """Return a lower bound of the cosine of an angle from 0 to 3: its alternating series, cut after a negative term."""
     demand(0 <= angle <= 3, "an angle is not between 0 and 3")
     Account.spend(80, 40 * longest([angle]))
     total, term = Fraction(0), Fraction(1)
