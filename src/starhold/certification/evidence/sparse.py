@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 class Compressed(NamedTuple):
-    """A matrix in compressed columns with sorted rows, with the fields of a `scipy.sparse.csc_matrix` that Clarabel reads."""
+    """A matrix in compressed columns, rows sorted, with the fields of a `scipy.sparse.csc_matrix` that Clarabel reads."""
 
     data: NDArray[np.float64]
     indices: NDArray[np.int64]

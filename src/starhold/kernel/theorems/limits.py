@@ -106,7 +106,7 @@ def loads(name: str, axis: Fraction | None, norm: Fraction | None) -> Iterator[t
 def within(
     bound: Fraction, load: Poly, z: list[Poly], paired: Sequence[Poly], known: Sequence[Poly], modulo: list[Poly]
 ) -> Squares:
-    """Return the obligation that a load is at most its bound; terms to be paired with the unit vector of a norm are given."""
+    """Return the obligation that a load is at most its bound; `paired` are the terms for the unit vector of a norm."""
     if not UNIT[0].names <= load.names:
         return Squares(bound - load, z, 0, known, modulo)
     more = [*UNIT, *(d * x for d in UNIT for x in paired)]

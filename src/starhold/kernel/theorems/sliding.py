@@ -1,4 +1,4 @@
-"""The theorem that a sliding-mode law reaches its surface, and where the motion goes from there. Proof: docs/kernel.md, 6."""
+"""The theorem that a sliding-mode law reaches its surface, and what follows for the motion. Proof: docs/kernel.md, 6."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def reaches_surface(claim: Claim) -> Proof:
 
 
 def declared(loop: AttitudeLoop) -> Part[tuple[list[Poly], Rows, list[Poly]]]:
-    """Show that the law's surface is s = w + Kq, and return s, K, and J s' without the torques of the law and from outside."""
+    """Show that the law's surface is s = w + Kq, and return s, K, and J s' without the law's and the external torques."""
     yield from loop.sound()
     s = loop.single("surface", 3)
     K = slopes(s, TURNS)
