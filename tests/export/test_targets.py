@@ -1,5 +1,5 @@
-"""The self-test runs on SPARC V8 (LEON3), emulated in user mode; `link/test_qemu.py` has other processors. It is skipped, with
-the reason, where the compiler or the emulator is not installed."""
+"""The self-test runs on SPARC V8 (LEON3), emulated in user mode; other processors have `link/test_qemu.py`. It is skipped,
+with the reason, where the compiler or the emulator is not installed."""
 
 import subprocess
 
