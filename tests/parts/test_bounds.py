@@ -14,7 +14,7 @@ from starhold.parts.orbit import BODIES, Elements, from_elements, highest_speed,
 from starhold.parts.plates import largest_torque
 from tests.tiers import leading
 
-GRAVITY, CRAFT = BODIES["Earth"].gravity, make_craft([0.05, 0.065, 0.025])
+GRAVITY = BODIES["Earth"].gravity
 
 
 def directions(random, count):

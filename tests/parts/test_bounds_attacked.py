@@ -148,13 +148,16 @@ def of_table(random):
     return share
 
 
-def of_unloading(random):
+def of_unloading(random, weak=False):
+    """weak: so little is asked for that the rods are never on their limit."""
     around = orbit(random)
     limit = tuple(10.0 ** random.uniform(-3, 2, 3))
     given = magnetic_unloading.Params(
         size(random, 1e-6, 10.0), limit, int(random.integers(2)), epoch=epoch(random, 2025, 2029)
     )
     momentum, moment, wrong = size(random, 1e-6, 10.0), size(random, 1e-5, 10.0), size(random, 1e-12, 1e-3)
+    if weak:
+        given, momentum, wrong = given._replace(gain=1e-6, dipole_limit=(1e3,) * 3), size(random, 1e-3, 1.0), 1e-15
     given = given._replace(momentum=vector(random, float(random.choice([0.0, momentum]))))
     field = field_strength(magnetic_field.prepared(given.epoch, 1.0))
     bound = magnetic_unloading.bound(given, envelope(around, momentum=momentum, moment=moment, field_error=wrong))
@@ -168,24 +171,26 @@ def of_unloading(random):
         rate = np.exp(5.0 * (x[:, 8:9] - 1.0)) * along(x[:, 8:11])
         stored = momentum * along(x[:, 11:14]) - moment * rate
         wanted = -given.gain * (stored - np.array(given.momentum))
-        dipole = np.cross(seen, wanted) / np.maximum((seen**2).sum(axis=1), 1e-300)[:, None]
+        dipole, most = np.cross(seen, wanted) / np.maximum((seen**2).sum(axis=1), 1e-300)[:, None], given.dipole_limit
         if not given.limited:
-            dipole = dipole / np.maximum((np.abs(dipole) / limit).max(axis=1), 1.0)[:, None]
-        torque = np.cross(np.clip(dipole, -np.array(limit), limit), true)
+            dipole = dipole / np.maximum((np.abs(dipole) / most).max(axis=1), 1.0)[:, None]
+        torque = np.cross(np.clip(dipole, -np.array(most), most), true)
         return np.linalg.norm(torque, axis=1) / (bound.torque + bound.per_rate * np.linalg.norm(rate, axis=1))
 
     return share
 
 
-def of_wheels(random):
+def of_wheels(random, kinds=None):
+    """kinds: of friction, 1 for those that there are: viscous, Coulomb's, and that which sticks."""
     axes = [three_orthogonal(), pyramid(), along(random.normal(size=(5, 3)))][int(random.integers(3))]
     count = len(axes)
     inertia, limit = 10.0 ** random.uniform(-7, 0, count), 10.0 ** random.uniform(-4, 2, count)
-    viscous, coulomb, sticking = 10.0 ** random.uniform(-9, -2, (3, count)) * random.choice([0.0, 1.0], (3, 1))
+    chosen = random.choice([0.0, 1.0], (3, 1)) if kinds is None else np.array(kinds)[:, None]
+    viscous, coulomb, sticking = 10.0 ** random.uniform(-9, -2, (3, count)) * chosen
     try:
         given = wheels.make_wheels(axes, inertia.tolist(), 1.0, limit.tolist(), viscous.tolist(), coulomb.tolist())
     except ValueError:
-        return of_wheels(random)
+        return of_wheels(random, kinds)
     over = 10.0 ** random.uniform(-1, 2, count)
     if sticking.any():
         given = given._replace(sticking=tuple(sticking.tolist()), stribeck_speed=tuple(over.tolist()))
@@ -258,7 +263,10 @@ ATTACKS = {
     "constant-torque": of_constant,
     "torque-table": of_table,
     "magnetic-unloading": of_unloading,
+    "magnetic-unloading of little": lambda random: of_unloading(random, weak=True),
     "wheels": of_wheels,
+    "wheels with viscous friction": lambda random: of_wheels(random, (1.0, 0.0, 0.0)),
+    "wheels with Coulomb friction": lambda random: of_wheels(random, (0.0, 1.0, 0.0)),
     "magnetometer": of_magnetometer,
     "gyro": of_gyro,
     "star-tracker": of_tracker,
