@@ -110,7 +110,7 @@ def telling(readings: Iterable[str]) -> list[Fitted]:
 
 
 @cache
-def _offered() -> EntryPoints:
+def _offered() -> Any:
     """Return the entry points of all installed packages. Packages are searched once, not for each role."""
     return entry_points()
 

@@ -18,7 +18,7 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
     from starhold.laws.modes import mode_laws
     from starhold.report.text import number_text
 
-    flown = [failure for failure in failures if failure.gains is not None]
+    flown = [(failure.name, failure.gains) for failure in failures if failure.gains is not None]
     sentences: list[str] = []
     for failure in failures:
         if not failure.controllable:
@@ -34,11 +34,14 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
             "not settled: judged at the end of the flight, for the target of the mode active then; to judge a single mode, "
             "give it as a [[law]] of its own and name it by --law."
         )
-    texts = {name: [number_text(failure.gains[name], 4) for failure in flown] for name in flown[0].gains}
+    texts = {name: [number_text(gains[name], 4) for _, gains in flown] for name in flown[0][1]}
     # The number of losses until the mode for them begins is not a gain.
     changed = [name for name, every in texts.items() if len({*every}) > 1 and name != "wheels_lost"]
     for name in changed:
-        lost = {text: [f.name for f, other in zip(flown, texts[name], strict=True) if other == text] for text in texts[name]}
+        lost = {
+            text: [case for (case, _), other in zip(flown, texts[name], strict=True) if other == text]
+            for text in texts[name]
+        }
         sentences.append(f"{name}: {', '.join(f'{text} {_cases(names)}' for text, names in lost.items())}")
     if not changed:
         sentences.append("The gains are the same in all of them.")
