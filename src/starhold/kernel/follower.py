@@ -12,7 +12,22 @@ from .numbers import Rows, added, beside, demand, norm, plus, reach, root, scala
 from .polynomials import Poly, apply, minus, most, var
 from .reader import Reader
 from .reading import Numbers
-from .regions import ANGLE, AT_REST, RATE, SPEED, STATE, TURN, Behind, Radii, Sizes, Tube, felt, stretch, widened, with_momentum
+from .regions import (
+    ANGLE,
+    AT_REST,
+    RATE,
+    SPEED,
+    STATE,
+    TURN,
+    Behind,
+    Radii,
+    Sizes,
+    Tube,
+    felt,
+    stretch,
+    widened,
+    with_momentum,
+)
 from .sentences import above, below
 
 ZERO = Fraction(0)
@@ -109,7 +124,7 @@ class Follower(Reader):
         """Read how late the torque is, if it is."""
         # Of what nears what is asked for alike in all components how exactly it is known. What noise makes of the torque
         # that acts, and what momentum makes of that; how large that of the linear motion is, and how far off it is at first.
-        self.inexact, self.drawn, self.held, self.apart_at_first = list[Fraction](), AT_REST, ZERO, ZERO
+        self.inexact, self.drawn, self.applied, self.unsettled = list[Fraction](), AT_REST, ZERO, ZERO
         if f"{LATE}mean" not in numbers:
             return None
         late = Late(*(numbers[LATE + name] for name in ("kept", "mean", "weight", "begun", "rest")))
@@ -195,16 +210,16 @@ class Follower(Reader):
             return
         sizes, heeded, (turned, rated) = tube.sizes, felt(self.heeded, "w", tube.sizes), self.noise
         z = sizes[SPEED] + self.away[0], sizes[ANGLE] + self.away[1]
-        self.held = self.asks(z) + heeded * z[0]
+        self.applied = self.asks(z) + heeded * z[0]
         noisy = self.asks(self.swayed) + self.asks((rated, turned / 2)) + self.drawn[0]
-        self.apart_at_first = 4 * self.held + noisy + heeded * (z[0] + rated)
+        self.unsettled = 4 * self.applied + noisy + heeded * (z[0] + rated)
 
     def entered(self, tube: Tube) -> Rows:
         """Return the matrix of an ellipsoid that holds the linear motion in a tube's region as it begins."""
         X = widened(tube.region.X, self.away)
         if not self.inexact:
             return X
-        none, torque = scalar(0), scalar(2 * self.held**2)
+        none, torque = scalar(0), scalar(2 * self.applied**2)
         return beside(plus(X, X), none + none) + beside(beside(none, none), torque)
 
     def lateness(self, tube: Tube) -> tuple[Fraction, Fraction]:

@@ -25,10 +25,10 @@ AROUND = [
 
 
 class Near(NamedTuple):
-    """A loop near its target: the law's torque and the acceleration as matrices on (w, q), and A, B and B' such that samples
-    of x = (w, q), or with a torque that lags (w, q, torque), are followed by Ax + Bu + B'v, with a torque u that is held
-    beside the law's, and v in what the law asks for; what a u does that grows to uh; the acceleration in the mean of a period
-    as a matrix on x, and on v; J^-1."""
+    """A loop near its target: the law's torque and the acceleration as matrices on (w, q); A, B and `asked` = C such that
+    samples of x = (w, q), or of (w, q, torque) with a torque that lags, are followed by Ax + Bu + Cv, with a torque u held
+    beside the law's, and v beside what the law asks for; what a u does that grows to uh; the acceleration in the mean of a
+    period as matrices on x and on v; J^-1."""
 
     torque: Rows
     rates: Rows
@@ -46,8 +46,8 @@ class Near(NamedTuple):
         return plus([row + [ZERO] * (len(self.A) - 3) for row in both], times(self.grown, times(body, self.mean)))
 
     def lagging(self, h: Fraction, kept: Fraction, mean: Fraction, moment: Fraction) -> Near:
-        """Return the loop with a torque that is off from what is asked for by so much in the mean of a period and in its end,
-        for each unit at first: it is one more vector of the state. moment: the mean by the time that is left."""
+        """Return the loop with a torque that is off from what is asked for by so much in the end of a period and in its
+        mean, for each unit at first: it is one more vector of the state. moment: in the mean by the time that is left."""
         N, T, none = self.inverse, self.torque, [[ZERO] * 3 for _ in AXES]
         off = [[c * x for x in row] for c in (h * mean, h * h / 2 * moment) for row in N]
         asked, acts = plus(self.B, off, -1), 1 - mean

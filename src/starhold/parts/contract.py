@@ -150,8 +150,7 @@ class Late(NamedTuple):
     """How what a part gives is late, in a loop of one control period. Let e be the command less what acts. In a period |e|
     does not grow, is no more than `mean` times its first value in the mean, and `kept` times that in the end; then it
     changes by as much as the command. All this while no component of e exceeds `most`. moment: of what is linear, so that e
-    keeps its direction and falls by exactly these shares of it, the mean in which e counts by the share of the period that is
-    left."""
+    keeps its direction and these shares are exact, the mean in which it counts by the share of the period that is left."""
 
     kept: float
     mean: float

@@ -41,8 +41,8 @@ def numbers_of(late: contract.Late | None) -> dict[str, Any]:
 
 
 def alike(late: contract.Late) -> list[tuple[Fraction, Fraction]]:
-    """Return what is known of how late a torque is at most and at least that nears what is asked for alike in all components,
-    in short numbers: in the end of a period, in the mean, and in that by the time that is left."""
+    """Return what is known at most and at least, in short numbers, of how late a torque is that nears what is asked for
+    alike in all components: in the end of a period, in the mean, and in that by the time that is left."""
     told = [float(getattr(late, name)) for name in KNOWN]
     return [(Fraction(ceil(x * FINE), FINE), Fraction(floor(x * LEAST * FINE), FINE)) for x in told]
 

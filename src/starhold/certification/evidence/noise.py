@@ -89,7 +89,9 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
         return width * float(optimize.brentq(missed, 1.0, 12.0)) * MORE
 
     count = len(near.A) // 3
-    shares = SHARES[: 2 + count] if spins == [None] else (*(0.9 * x for x in SHARES[: 2 + count]), *(0.1 * SHARES[0],) * count)
+    shares = (
+        SHARES[: 2 + count] if spins == [None] else (*(0.9 * x for x in SHARES[: 2 + count]), *(0.1 * SHARES[0],) * count)
+    )
     # A random torque takes as much as an error.
     shares = [x * (1.0 - SHARES[0] * bool(noise.torque)) for x in shares]
     often = [len(spins) * len(pair) if k > 1 else 1 for k, pair in enumerate(parts.values())]

@@ -51,8 +51,8 @@ PLACES, FINE, SLIGHT = 100, 160, 40
 def within_radii(claim: Claim, motion: Held) -> Part[Statement]:
     """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
     than noise.attitude and noise.rate, the random torque than noise.torque, other standard normal vectors no longer than
-    noise.beside, and the rate and the turn that the errors and this torque cause near the target, and the torque that acts if
-    it lags, no larger than told, nor what momentum makes of these, but with a probability of `share` at most."""
+    noise.beside, and the rate and the turn, and the torque that lags, which the errors and this torque cause near the target
+    no larger than told, nor what momentum makes of these, but with a probability of `share` at most."""
     numbers = claim.numbers
     share, samples, every = (numbers[name] for name in (SHARE, "samples", "every"))
     demand(1 <= every <= MOST and every.denominator == samples.denominator == 1, "samples are not counted")

@@ -12,7 +12,7 @@ from ..held import Held
 from ..loops import AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim, Numbers
-from ..regions import ANGLE, AT_REST, RATE, TURN, Tube, as_told, balls, widened
+from ..regions import ANGLE, AT_REST, RATE, TURN, Tube, as_told, balls
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
@@ -100,7 +100,11 @@ def points(claim: Claim) -> Proof:
         tube, more = forgotten(motion, tube)
         samples += more
         shape, parts, *rest = read_table(one, "shape", "shares", "rate", "reach")
-        X, shares, (rate, reach) = matrix(shape, len(entered), len(entered)), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
+        X, shares, (rate, reach) = (
+            matrix(shape, len(entered), len(entered)),
+            [rational(x) for x in read_list(parts, 3)],
+            map(rational, rest),
+        )
         free = 1 - sum(shares, Fraction(0))
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
         left = plus([[rate * x for x in row] for row in X], spread(shares, motion.linear(tube)), -1)
@@ -208,7 +212,7 @@ def forgotten(motion: Held, tube: Tube, near: bool = True) -> tuple[Tube, int]:
     if near:
         linear, rest = motion.lateness(tube)
         left = (linear + rest) / SLIGHT
-        samples = periods(1 - late.kept, Fraction(0), sizes[FIRST] + sizes[REST] + motion.apart_at_first, left)
+        samples = periods(1 - late.kept, Fraction(0), sizes[FIRST] + sizes[REST] + motion.unsettled, left)
         late_by = {FIRST: linear, REST: rest + left}
     else:
         change = motion.change_in(tube)

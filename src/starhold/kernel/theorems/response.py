@@ -50,7 +50,7 @@ class Response:
         first, last, turn = (b for _, b in motion.linear(tube, begun[0], pulled))
         pushes = first, max(last - first, Fraction(0)), turn
         sizes = [min(region_sizes[name] + away[i // 3], begun[i // 3]) for i, name in enumerate(STATE)]
-        sizes += [motion.held] * (len(motion.near.A) - len(STATE))
+        sizes += [motion.applied] * (len(motion.near.A) - len(STATE))
         wide, turned, pulled = (
             up(sum((gain * b for gain, b in zip(gains, pushes, strict=True)), norm(reach(self.left[part], sizes))))
             for gains, part in zip(self.gains, PARTS.values(), strict=True)
