@@ -189,7 +189,7 @@ class Follower(Reader):
         turned = turn + curved
         off = linear + turned * h / 2
         grown = off * back * more + bent * more
-        rest = 2 * (self.mistaken(tube) + self.stale(sizes, u))
+        rest = 2 * self.mistaken(tube) + self.renewed(sizes, u)
         rest += (off + grown) * drift + turned * aside
         rows = [(Fraction(1), self.demanded), (curved, Aq), (grown, Aw), ((off + grown) * gyrating, w)]
         M = together(rows, [near[x] for x in STATE])
@@ -212,7 +212,7 @@ class Follower(Reader):
         z = sizes[SPEED] + self.away[0], sizes[ANGLE] + self.away[1]
         self.applied = self.asks(z) + heeded * z[0]
         noisy = self.asks(self.swayed) + self.asks((rated, turned / 2)) + self.drawn[0]
-        self.unsettled = 4 * self.applied + noisy + heeded * (z[0] + rated)
+        self.unsettled = 4 * (self.applied + noisy + heeded * (z[0] + rated))
 
     def entered(self, tube: Tube) -> Rows:
         """Return the matrix of an ellipsoid that holds the linear motion in a tube's region as it begins."""
@@ -227,18 +227,27 @@ class Follower(Reader):
         linear motion has in it, and what not."""
         assert self.late is not None
         sizes, drift, turned = tube.sizes, norm(tube.end), tube.turned
-        pace, errors, told = 1 / (1 - self.late.kept), 2 * self.mistaken(tube), 2 * self.stale(sizes, self.loop.u)
+        pace, errors, told = 1 / (1 - self.late.kept), 2 * self.mistaken(tube), self.renewed(sizes, self.loop.u)
         linear = self.asks((drift, turned))
         if not self.inexact:
             curved = felt(self.beyond, "w", sizes) * drift + felt(self.beyond, "q", sizes) * turned
             return ZERO, up((linear + curved + told + errors) * pace)
         # What is linear, and what momentum makes of the rates, changes within the motion; errors filtered are errors.
         curved = felt(self.bare, "w", sizes) * drift + felt(self.bare, "q", sizes) * turned
-        spun = felt(self.heeded, "w", sizes) * drift
-        shifted = 2 * self.stale(sizes, self.leaning) + self.inexact[0] * tube.late.most
+        spun, slow = (felt(self.heeded, "w", sizes) * drift, [with_momentum(p, "r") for p in self.loop.u])
+        rest = curved + self.renewed(sizes, minus(self.loop.u, slow)) + self.renewed(sizes, self.leaning)
+        rest += self.inexact[0] * tube.late.most
         if any(self.apart):
-            shifted += 2 * self.changes(sizes)["h"] / self.size("h") * self.drawn[1]
-        return up((linear + spun) * pace + errors), up((curved + told + shifted) * pace)
+            rest += 2 * self.changes(sizes)["h"] / self.size("h") * self.drawn[1]
+        return up((linear + spun + self.renewed(sizes, slow)) * pace + errors), up(rest * pace)
+
+    def spun_late(self, tube: Tube, fast: Fraction) -> Fraction:
+        """Return how late is at most what the law's torque makes of momentum and a rate of up to `fast`, and of what
+        momentum makes of noise: no more than twice itself, and no more than it changes."""
+        if not (self.inexact and self.late):
+            return ZERO
+        changed = norm(tube.end) / (1 - self.late.kept) + 2 * self.swayed[0]
+        return felt(self.heeded, "w", tube.sizes) * (min(2 * fast, changed) + 2 * self.apart[0])
 
     def paced(self, tube: Tube, pulled: Fraction, torque: Fraction | None = None) -> Fraction:
         """Return how large the acceleration is in the mean of a period, of a linear motion for which as much is asked as

@@ -354,9 +354,8 @@ class Held(Follower):
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         near = region.sizes | {"v": turn * turn}
-        # What the law's torque does about momentum may be late too.
-        spins = felt(self.turning, "w", near) + 2 * felt(self.heeded, "w", near) * bool(self.inexact)
-        odd = norm(most(p, near) for p in self.left) + spins * (fast + self.apart[0])
+        odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
+        odd += self.spun_late(tube, fast)
         # What noise adds has in it what momentum makes of it, but not what it makes of that.
         noisy = felt(self.heeded, "w", near) * self.noise[1] * self.light
         at_ends, along, uneven = self.ends(tube)
