@@ -17,6 +17,7 @@ from starhold.certification.evidence.finding import certificate, read
 from starhold.certification.proofs import pointed
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import late_torque, named
+from starhold.conformance.parts import examine_part, find_part
 from starhold.kernel.check import check
 from starhold.kernel.follower import FIRST, REST
 from starhold.kernel.held import Held
@@ -25,9 +26,11 @@ from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.theorems.pointing import forgotten, on_level
 from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
+from starhold.scenario.reading import parse
 from starhold.studies.compare import record
-from tests.certification.attack import Attack
+from tests.certification.attack import Attack, flown
 from tests.kernel.flights import Around, along
+from tests.parts.files import BODY, FILES, PD, part
 from tests.tiers import leading
 
 LATE = [(("lag", 0.05),), (("rate-limit", 0.1),), (("lag", 0.5),)]
@@ -58,6 +61,23 @@ def test_an_actuator_that_lags_is_in_the_claim_and_no_flight_breaks_it(late):
     found, shares = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, 3).worst()
     assert found == ""
     assert max(shares) > 0.1
+
+
+def test_one_file_with_an_actuator_that_says_how_late_it_is_is_in_the_claim_checked_and_flown(tmp_path):
+    (tmp_path / "drive.py").write_text(FILES["drive.py"])
+    text = BODY + "substeps = 8\n" + part('file = "drive.py"\nbandwidth = "2 Hz"\n') + PD
+    scenario = parse(text, "own", tmp_path)
+    loop = build(scenario, scenario.laws[0])
+    claim, _ = pointed(make_subject(loop))
+    assert claim.numbers["late_torque"] > 0.0
+    (whole,) = named([claim], loop, 0.0)
+    assert not [name for name in whole.assumptions if name.startswith("without:drive")]
+    assert "late-alike" in whole.assumptions
+    assert 0.0 < flown(loop, claim, np.random.default_rng(1), 16) <= 1.0
+    wrong = tmp_path / "faster.py"
+    wrong.write_text(FILES["drive.py"].replace("x = fastest", "x = 1.1 * fastest"))
+    for path, passed in ((tmp_path / "drive.py", True), (wrong, False)):
+        assert passed == all(v.outcome != "failed" for v in examine_part(find_part(str(path))))
 
 
 def test_a_lag_that_makes_the_loop_unstable_is_left_out_by_name():
