@@ -227,11 +227,11 @@ class Follower(Reader):
         linear motion has in it, and what not."""
         assert self.late is not None
         sizes, drift, turned = tube.sizes, norm(tube.end), tube.turned
-        pace, errors, told = 1 / (1 - self.late.kept), 2 * self.mistaken(tube), self.renewed(sizes, self.loop.u)
+        pace, errors, changed = 1 / (1 - self.late.kept), 2 * self.mistaken(tube), self.renewed(sizes, self.loop.u)
         linear = self.asks((drift, turned))
         if not self.inexact:
             curved = felt(self.beyond, "w", sizes) * drift + felt(self.beyond, "q", sizes) * turned
-            return ZERO, up((linear + curved + told + errors) * pace)
+            return ZERO, up((linear + curved + changed + errors) * pace)
         # What is linear, and what momentum makes of the rates, changes within the motion; errors filtered are errors.
         curved = felt(self.bare, "w", sizes) * drift + felt(self.bare, "q", sizes) * turned
         spun, slow = (felt(self.heeded, "w", sizes) * drift, [with_momentum(p, "r") for p in self.loop.u])

@@ -25,7 +25,7 @@ AROUND = [
 
 
 class Near(NamedTuple):
-    """A loop near its target: the law's torque and the acceleration as matrices on (w, q); A, B and `asked` = C such that
+    """A loop near its target: the law's torque and the acceleration as matrices on (w, q); A, B and C = `commanded` such that
     samples of x = (w, q), or of (w, q, torque) with a torque that lags, are followed by Ax + Bu + Cv, with a torque u held
     beside the law's, and v beside what the law asks for; what a u does that grows to uh; the acceleration in the mean of a
     period as matrices on x and on v; J^-1."""
@@ -34,7 +34,7 @@ class Near(NamedTuple):
     rates: Rows
     A: Rows
     B: Rows
-    asked: Rows
+    commanded: Rows
     grown: Rows
     mean: Rows
     eased: Rows
@@ -42,7 +42,7 @@ class Near(NamedTuple):
 
     def spun(self, law: Rows, body: Rows) -> Rows:
         """Return what the law's torque and the body's add to A that are these matrices times the rates."""
-        both = plus(times(self.asked, law), times(self.B, body))
+        both = plus(times(self.commanded, law), times(self.B, body))
         return plus([row + [ZERO] * (len(self.A) - 3) for row in both], times(self.grown, times(body, self.mean)))
 
     def lagging(self, h: Fraction, kept: Fraction, mean: Fraction, moment: Fraction) -> Near:
@@ -50,12 +50,12 @@ class Near(NamedTuple):
         mean, for each unit at first: it is one more vector of the state. moment: in the mean by the time that is left."""
         N, T, none = self.inverse, self.torque, [[ZERO] * 3 for _ in AXES]
         off = [[c * x for x in row] for c in (h * mean, h * h / 2 * moment) for row in N]
-        asked, acts = plus(self.B, off, -1), 1 - mean
+        commanded, acts = plus(self.B, off, -1), 1 - mean
         late = beside([[(1 - kept) * x for x in row] for row in T], scalar(kept))
         return self._replace(
             A=beside(plus(self.A, times(off, T), -1), off) + late,
             B=self.B + none,
-            asked=asked + scalar(1 - kept),
+            commanded=commanded + scalar(1 - kept),
             grown=self.grown + none,
             mean=beside([[acts * x for x in row] for row in self.rates], [[mean * x for x in row] for row in N]),
             eased=[[acts * x for x in row] for row in N],

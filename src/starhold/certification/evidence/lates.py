@@ -34,17 +34,17 @@ def numbers_of(late: contract.Late | None) -> dict[str, Any]:
     if late is None:
         return {}
     numbers = {"kept": late.kept, "mean": late.mean, "most": late.most, "weight": 1.0, "begun": 0.0, "rest": 0.0}
-    told: dict[str, Any] = {LATE + name: x for name, x in numbers.items() if isfinite(x)}
+    claimed: dict[str, Any] = {LATE + name: x for name, x in numbers.items() if isfinite(x)}
     for name, (most, least) in zip(KNOWN, alike(late), strict=True) if late.moment is not None else ():
-        told |= {LATE + name: most, f"{LATE}{name}.least": least}
-    return told
+        claimed |= {LATE + name: most, f"{LATE}{name}.least": least}
+    return claimed
 
 
 def alike(late: contract.Late) -> list[tuple[Fraction, Fraction]]:
     """Return what is known at most and at least, in short numbers, of how late a torque is that nears what is asked for
     alike in all components: in the end of a period, in the mean, and in that by the time that is left."""
-    told = [float(getattr(late, name)) for name in KNOWN]
-    return [(Fraction(ceil(x * FINE), FINE), Fraction(floor(x * LEAST * FINE), FINE)) for x in told]
+    shares = [float(getattr(late, name)) for name in KNOWN]
+    return [(Fraction(ceil(x * FINE), FINE), Fraction(floor(x * LEAST * FINE), FINE)) for x in shares]
 
 
 def of_late(late: Late | None) -> dict[str, Fraction]:

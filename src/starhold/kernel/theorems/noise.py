@@ -139,7 +139,7 @@ def driven(
         return plus(times(rated, rows[size + 3 :]), times(turned, rows[size : size + 3]), Fraction(1, 2))
 
     pushed: Rows = [[random * x for x in row] if random else [] for row in near.B]
-    plain = [times(near.asked, torque(rows)) for rows in (errors, noise)]
+    plain = [times(near.commanded, torque(rows)) for rows in (errors, noise)]
     still = [[Fraction(0)] * len(near.A) for _ in errors]
 
     def unpushed(rows: Rows) -> Rows:
@@ -151,7 +151,7 @@ def driven(
 
     def more(rows: Rows) -> Rows:
         grown = times(near.grown, times(body, times(near.eased, torque(rows))))
-        return plus(times(near.asked, times(law, rows[size + 3 :])), grown)
+        return plus(times(near.commanded, times(law, rows[size + 3 :])), grown)
 
     # x of both signs is that without, half of their sum, and by its sign what momentum makes of that.
     half = [[x / 2 for x in row] for row in near.spun(law, body)]
