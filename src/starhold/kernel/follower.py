@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -117,8 +118,12 @@ class Follower(Reader):
     leaning: list[Poly]
     apart: Radii
     swayed: Radii
-    away: Radii
     late: Late | None
+
+    @property
+    @abstractmethod
+    def away(self) -> Radii:
+        """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
 
     def follow(self, numbers: Numbers) -> Late | None:
         """Read how late the torque is, if it is."""

@@ -25,7 +25,7 @@ AROUND = [
 
 
 class Near(NamedTuple):
-    """A loop near its target: the law's torque and the acceleration as matrices on (w, q); A, B and C = `commanded` such that
+    """A loop near its target: the law's torque and the acceleration as matrices on (w, q); A, B and C = `commanded` so that
     samples of x = (w, q), or of (w, q, torque) with a torque that lags, are followed by Ax + Bu + Cv, with a torque u held
     beside the law's, and v beside what the law asks for; what a u does that grows to uh; the acceleration in the mean of a
     period as matrices on x and on v; J^-1."""

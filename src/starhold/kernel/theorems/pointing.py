@@ -216,6 +216,7 @@ def forgotten(motion: Held, tube: Tube, near: bool = True) -> tuple[Tube, int]:
         late_by = {FIRST: linear, REST: rest + left}
     else:
         change = motion.change_in(tube)
+        assert change is not None
         begun, end = sizes[REST], NEARLY * change.settled
         samples = periods(1 - change.kept, change.settled, begun, end)
         late_by = {REST: min(begun, end)}
