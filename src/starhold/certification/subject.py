@@ -51,7 +51,7 @@ class Subject:
     total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels;
     tolerance: in the pointing claim the inertia's entries are off by this share of sqrt(J_ii J_kk) at most, None where the
     inertia is as given; pull: bound of the torque that an inertia of one has by the gravity gradient (1/s2); lags: whether
-    the pointing claim is about how late the torque is too."""
+    the pointing claim is about what is late too: the torque, and what the law is told as the body moves."""
 
     loop: ClosedLoop
     disturbance: Any
@@ -77,6 +77,7 @@ class Subject:
     def against(self, envelope: Envelope) -> Pushes:
         """Return bounds of what acts on the loop and is told to no law, the pull on what the inertia is off by included."""
         bounds = pushes(self.loop, envelope)
+        bounds = bounds if self.lags else bounds.steady
         return bounds._replace(outside=bounds.outside + float(self.disturbance) + above(self.pull) * self.off)
 
     @property
