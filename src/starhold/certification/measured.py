@@ -115,12 +115,11 @@ def measured(loop: ClosedLoop) -> Measured | None:
     tell: Any = estimators[0].part.hook("recursion")
     if tell is None:
         return None
-    units = noise._replace(attitude=IDENTITY, rate=1.0, walk=0.0, more=(IDENTITY,) * len(noise.more))
-    rate = _rate(loop)
-    recursion, unit = (tell(estimators[0].params, one, loop.period, rate) for one in (noise, units))
+    given = estimators[0].params, loop.period, _rate(loop)
+    recursion: Recursion | None = tell(given[0], noise, *given[1:])
     if recursion is None:
         return None
-    told = _estimated(unit, [bound for _, bound in rates], [bound for _, bound in attitudes], loop.period)
+    told = _estimated(tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
     return None if told is None else Measured(told, recursion, (*sensors, *estimators), random)
 
 
@@ -156,32 +155,33 @@ def shown(sensor: Fitted) -> set[str]:
     return set(sensor.part.module.Reading._fields)
 
 
-def _estimated(recursion: Recursion, rates: list[Any], attitudes: list[Any], period: float) -> Told | None:
+def _estimated(tell: Any, given: Any, noise: Noise, rates: list[Any], attitudes: list[Any]) -> Told | None:
     """Return the errors of an estimate with errors of its readings besides noise; None where it does not forget them. It
-    removes a bias of the rate. recursion: with normal errors of deviation one."""
-    given = [*rates[:1], *attitudes]
+    removes a bias of the rate."""
+    units = noise._replace(attitude=IDENTITY, rate=1.0, walk=0.0, more=(IDENTITY,) * len(noise.more))
     steady = [(gyro.rate - gyro.bias, gyro.turned, gyro.late) for gyro in rates[:1]] or [(0.0, 0.0, 0.0)]
     steady += [(tracker.attitude, tracker.turning, 0.0) for tracker in attitudes]
-    if not recursion.lag and not any(map(any, steady)):
-        return Told()
-    gains = _gains(recursion)
+    gains = _gains(tell, given, units)
     if gains is None:
         return None
-    (towards, later), steps, kept = gains
+    towards, later, steps, kept = gains
+    if not any(later) and not any(map(any, steady)):
+        return Told()
     # Of attitude and rate: how much comes of each reading.
     (attitude, turned, hurried), (rate, rated, late) = (
         [float(np.dot(one, sizes)) for sizes in zip(*steady, strict=True)] for one in towards
     )
-    hurried, late = (x + more * recursion.lag for x, more in zip((hurried, late), later, strict=True))
-    ago = steps * period + max(one.ago for one in given)
+    hurried, late = (x + more for x, more in zip((hurried, late), later, strict=True))
+    ago = steps * given[1] + max(one.ago for one in (*rates, *attitudes))
     return Told(attitude, rate, turned, hurried, rated, late, ago, kept)
 
 
 @cache
-def _gains(recursion: Recursion) -> tuple[tuple[list[list[float]], list[float]], int, float] | None:
+def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list[float], int, float] | None:
     """Return how large errors of attitude and rate become at most with errors of up to one of the gyro and of each attitude,
-    and with those of the gyro at earlier steps alone; after how many steps about a share of what is more is left, and what
-    share. None for an estimate that does not forget."""
+    and with an acceleration of the body of one; after how many steps about a share of what is more is left, and what share.
+    None for an estimate that does not forget. noise: of deviations of one."""
+    recursion: Recursion = tell(given[0], noise, *given[1:])
     every, size = recursion.every, 3 * recursion.size
     steps = [*[_matrix(recursion.carried, recursion)] * (every - 1), _matrix(recursion.corrected, recursion)]
     motions = [step[:size, :size] for step in steps]
@@ -191,14 +191,15 @@ def _gains(recursion: Recursion) -> tuple[tuple[list[list[float]], list[float]],
     found = [_sums(steps, phase, count, size) for phase in range(every)]
     lags = np.max([np.cumsum(one[..., ::-1], axis=-1)[..., ::-1] for one in found], axis=0) * (1.0 + 1e-6)
     # From lags of k steps on: rows for attitude and rate, columns for readings.
+    towards, later = lags[..., 0].tolist(), (recursion.lag * lags[:, 0, 1]).tolist()
     first = every * max(1, ceil(log(SHARE) / log(max(radius, SMALL))))
     while first < lags.shape[-1]:
         after = lags[..., first::first] / np.maximum(lags[..., :1], 1e-300)
         kept = float((after ** (1.0 / np.arange(1, after.shape[-1] + 1))).max())
         if kept <= 2.0 * SHARE:
-            return (lags[..., 0].tolist(), lags[:, 0, 1].tolist()), first, kept
+            return towards, later, first, kept
         first *= 2
-    return (lags[..., 0].tolist(), lags[:, 0, 1].tolist()), lags.shape[-1], SMALL
+    return towards, later, lags.shape[-1], SMALL
 
 
 def _sums(steps: list[Array], phase: int, count: int, size: int) -> Array:
