@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from math import inf
 from pathlib import Path
 from typing import Any, cast
@@ -11,9 +12,10 @@ import numpy as np
 from starhold.algebra.quaternion import NO_TURN, conjugate, multiply, normalise, to_reference, vector_part
 from starhold.algebra.structure import flatten, leaves
 from starhold.algebra.vector import ZERO, Vector, add, apply, norm, scale, subtract
+from starhold.certification.measured import bounded
 from starhold.certification.target_motion import motion_of
 from starhold.certification.unmodelled import COMMANDED, envelope_of
-from starhold.conformance.bench import PERIOD, sample_loop
+from starhold.conformance.bench import PERIOD, anywhere, moving, sample_loop
 from starhold.conformance.units import SYSTEMS, rescale, rescale_params
 from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, find, require, run
 from starhold.errors import InputError
@@ -236,7 +238,7 @@ def keeps_what_it_says(part: Part) -> None:
         if tell_errors and part.role in COMMANDED:
             command = tell_errors(params, envelope)
         elif tell_errors:
-            errors = tell_errors(params)
+            errors = bounded(next(f for f in loop.parts if f.part == part), loop.period) or UNBOUNDED
         if tell_torque:
             torque = tell_torque(params, envelope)
         if tell_change:
@@ -322,11 +324,8 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
         return push.torque + push.per_rate * norm(state.rate)
 
     memory = fitted.remembered(numbers, *([loop.start] if part.role == "sensor" else []))
-    for step in range(STEPS):
-        turned = random.normal(size=4)
-        state = loop.start._replace(
-            attitude=tuple((turned / np.linalg.norm(turned)).tolist()), rate=tuple(random.normal(size=3).tolist())
-        )
+    states = (moving if errors.grow else anywhere)(loop, random)
+    for step, (state, fast, hurried) in enumerate(islice(states, STEPS)):
         if part.role == "environment":
             memory = module.update(memory, state, numbers, dice, step) if part.hook("update") else memory
             yield "torque", norm(module.torque(state, numbers, loop.craft, memory)), most(torque, state)
@@ -335,9 +334,13 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
             if hasattr(reading, "attitude"):
                 # The angle, for either sign of the quaternion.
                 turn = 2.0 * norm(vector_part(multiply(conjugate(state.attitude), reading.attitude)))
-                yield "error of the attitude", turn, errors.attitude
+                yield "error of the attitude", turn, errors.attitude + errors.turning * fast
             if hasattr(reading, "rate"):
-                yield "error of the rate", norm(subtract(reading.rate, state.rate)), errors.rate
+                yield (
+                    "error of the rate",
+                    norm(subtract(reading.rate, state.rate)),
+                    errors.rate + errors.turned * fast + errors.late * hurried,
+                )
         elif part.role == "actuator" and part.hook("command"):
             torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
             yield (

@@ -235,7 +235,8 @@ class Held(Follower):
 
         def misread(bounds: list[Fraction]) -> tuple[Region, list[Fraction]]:
             where = replace(region, sizes=sizes | named(AMISS, bounds[4:]))
-            return where, [x + rigid for x in self.misread(where)]
+            steady = [x + rigid for x in self.misread(where)]
+            return where, list(map(up, steady)) if self.grows else steady
 
         begun, bound = told or [ZERO, ZERO], told or not self.grows
         read = misread([ZERO] * 4 + begun)

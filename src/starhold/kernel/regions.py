@@ -13,6 +13,8 @@ from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, time
 from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
+FAR = 1 << 100
+"""What bounds that settle do not exceed."""
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
 SPEED, ANGLE, PULL, LOAD = "|w", "|q", "|u", "|j"
 """Under which the sizes have those of |w| and |q|, of the acceleration that is linear in the state where it is known, and in
@@ -220,4 +222,6 @@ def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Frac
         if all(x <= y for x, y in zip(further, bounds, strict=True)):
             return bounds
         bounds = [up(x + x / 2**20) for x in further]
+        if max(bounds) > FAR:
+            break
     raise RefusedError("the period is too long for the rates")

@@ -158,10 +158,12 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """Return a MEMS gyro, one with only a bias, an exact one, and one with errors of manufacture, a delay and jitter."""
+    """Return a MEMS gyro, one with only a bias, an exact one, one with errors of manufacture, a delay and jitter, and that
+    without what has no bound."""
     mems = Params(noise=math.radians(0.15) / 60.0, bias=(1e-4, -2e-4, 5e-5), bias_walk=math.radians(3.0) / HOUR)
     skewed = ((1e-3, 0.0, 5e-4), (0.0, -2e-3, 0.0), (0.0, 3e-4, 0.0))
     built = mems._replace(
         mounting_error=(2e-3, 0.0, -1e-3), axis_errors=skewed, resolution=1e-4, bias_instability=1e-5, correlation_time=300.0
     )._replace(delay=0.03, jitter=1e-3)
-    return [mems._replace(limit=math.radians(100.0)), Params(bias=mems.bias), Params(), built]
+    bounded = built._replace(bias_instability=0.0, jitter=0.0)
+    return [mems._replace(limit=math.radians(100.0)), Params(bias=mems.bias), Params(), built, bounded]
