@@ -21,9 +21,9 @@ from starhold.certification.comparison import _numbers as numbers_apart
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import certificate as found
+from starhold.certification.measured import _rate as goal_rate
 from starhold.certification.proofs import checked
 from starhold.certification.subject import described, make_subject
-from starhold.certification.unmodelled import _rate as goal_rate
 from starhold.certification.unmodelled import change_of_modelled, driven_errors, envelope_of, named, noisy_fields, pushes
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed

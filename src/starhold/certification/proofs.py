@@ -288,6 +288,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         numbers["late.torque.weight"] * numbers["late.torque.begun"] ** 2 if "late.torque.mean" in numbers else Fraction(0)
     )
     ends = {"level": "highest", "settling": "settling", "angle": "end.angle", "rate": "end.rate"}
+    grown = [float(numbers.get(name, 0)) for name in GROWING]
     return {
         "period": float(numbers["period"]),
         "slew_angle": angle,
@@ -302,7 +303,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         **{name: float(numbers[name]) for name in ("momentum", "memory") if name in numbers},
         **({"plan_error": above(numbers["plan.error"])} if "plan.error" in numbers else {}),
         **({"late_torque": below(numbers["late.torque.begun"])} if "late.torque.begun" in numbers else {}),
-        "told_growth": [float(numbers.get(name, 0)) for name in GROWING],
+        **({"told_growth": grown} if any(grown) else {}),
         "start": above(numbers["level"] - behind),
         **{name: above(numbers[key]) for name, key in ends.items()},
     }

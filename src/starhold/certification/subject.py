@@ -22,10 +22,11 @@ from starhold.certification.matrices import (
     rows,
     upper,
 )
+from starhold.certification.measured import driven_errors
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
 from starhold.certification.target_motion import motion_of, perigee
-from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, is_read, late_torque, pushes
+from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, grows, is_read, late_torque, pushes
 from starhold.errors import InputError
 from starhold.kernel.numbers import Rows, plus
 from starhold.laws.catalogue import Law
@@ -84,6 +85,11 @@ class Subject:
     def late(self) -> Late | None:
         """How late the torque is in the pointing claim."""
         return late_torque(self.loop) if self.lags else None
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the pointing claim is about noise, as far as the parts with it are not left out for what is late."""
+        return driven_errors(self.loop) is not None and (self.lags or not grows(self.loop))
 
     @property
     def moving(self) -> bool:

@@ -189,7 +189,7 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         envelope = envelope_of(loop, momentum, bool(noisy))
         moved = appendages(loop) if claim.kind == "appendages" else ()
         there = (*noisy, *moved, *(_moving(loop) if claim.numbers.get("late_torque") else ()))
-        grown = any(claim.numbers["told_growth"])
+        grown = "told_growth" in claim.numbers
         # What grows is in the claim or the parts are not, nor is what noise drives of them.
         left = {f for parts, one in told.items() if one.grows and not grown for f in parts}
         random = set[Fitted]() if driven is None or noisy else {*driven.parts}

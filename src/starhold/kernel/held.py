@@ -397,8 +397,3 @@ class Held(Follower):
         """Return how far q is at most, between two samples, from the straight line between them."""
         fastest, sizes = norm(tube.drift) / self.h + (tube.stale + tube.late.most - tube.late.moved) * self.light, tube.sizes
         return self.h * self.h / 16 * (fastest + sizes[SPEED] ** 2 / 2 * sizes[ANGLE])
-
-    def misleading(self, tube: Tube) -> list[Fraction]:
-        """Return how much more attitude and rate are off at most that the law is told, after a motion in a tube."""
-        fastest = norm(tube.end) / self.h + (tube.stale + tube.late.most - tube.late.mean) * self.light
-        return self.misleads(tube.sizes, fastest)

@@ -11,7 +11,7 @@ from functools import cached_property
 from .loops import AttitudeLoop
 from .numbers import Rows, norm, reach, root
 from .polynomials import Poly
-from .regions import AMISS, ANGLE, AT_REST, SPEED, Radii, Region, Sizes, as_told, felt, stretch
+from .regions import AMISS, ANGLE, AT_REST, SPEED, Radii, Region, Sizes, Tube, as_told, felt, stretch
 
 ZERO = Fraction(0)
 
@@ -31,6 +31,7 @@ class Reader(ABC):
     unlike: list[Poly]
     h: Fraction
     off: Fraction
+    light: Fraction
 
     @abstractmethod
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
@@ -50,6 +51,11 @@ class Reader(ABC):
         """Return how much of that comes of a motion with these rates, relative to the target, and this acceleration."""
         w, r = sizes[SPEED], self.size("r")
         return reach(self.moving, [w + r, acceleration + self.size("a") + w * r])
+
+    def misleading(self, tube: Tube) -> list[Fraction]:
+        """Return how much more attitude and rate are off at most that the law is told, after a motion in a tube."""
+        fastest = norm(tube.end) / self.h + (tube.stale + tube.late.most - tube.late.mean) * self.light
+        return self.misleads(tube.sizes, fastest)
 
     def wrong(self, sizes: Sizes) -> Sizes:
         """Return how far off what the law is told is at most, by its letters."""

@@ -25,8 +25,7 @@ from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
 from starhold.certification.matrices import above, floats
-from starhold.certification.measured import driven_errors
-from starhold.certification.unmodelled import Pushes, change_of_modelled, grows
+from starhold.certification.unmodelled import Pushes, change_of_modelled
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand, plus, times, transpose
@@ -92,20 +91,20 @@ class Chain:
         late = of_late(self.motion.late)
         if self.motion.plan is None:
             return {"level": self.level} | late
-        off = self.motion.planned(self.motion.tube(self.motion.region(Fraction(self.level))).region.sizes)
+        region = self.motion.region(Fraction(self.level))
+        off = self.motion.planned((self.motion.tube(region).region if self.motion.grows else region).sizes)
         return {"level": self.level} | late | {"plan.error": float(off) * MORE}
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
-        c = Fraction(self.level)
-        tube = self.motion.tube(self.motion.region(c))
+        c, tube = Fraction(self.level), None
         while len(self.levels) < LEVELS and (lower := self.lower(c)) is not None:
             tau, beta, floor = lower
             end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
             if end > c * Fraction(9, 10):
                 break
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
-            tube, more = on_level(self.motion, end, tube)
+            tube, more = on_level(self.motion, end, tube or self.motion.tube(self.motion.region(c)))
             self.samples += periods(self.motion.h * beta, floor, c, end) + more
             c = end
         return float(c)
@@ -169,14 +168,8 @@ class Chain:
                 heed = 0.0
                 continue
             self.samples += more
-            self.ellipsoids.append(
-                {
-                    "shape": [[str(x) for x in row] for row in X],
-                    "shares": [str(x) for x in a],
-                    "rate": str(Fraction(rate)),
-                    "reach": str(Fraction(reach)),
-                }
-            )
+            one = {"shape": [[str(x) for x in row] for row in X], "shares": [str(x) for x in a]}
+            self.ellipsoids.append(one | {"rate": str(Fraction(rate)), "reach": str(Fraction(reach))})
             room = 1 - sum(a)
             fall = 1 - Fraction(rate) * room
             self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
@@ -225,8 +218,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
         beyond = list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
-        noisy = driven_errors(loop.loop) is not None and (loop.known.lags or not grows(loop.loop))
-        kinds = [True] * noisy + [False]
+        kinds = [True] * loop.known.noisy + [False]
     else:
         turn, rate = (float(Fraction(like.get(f"start.{name}", like.get(name, 0)))) for name in ("angle", "rate"))
         tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, list[float]())]
@@ -268,10 +260,8 @@ class Pushed:
         # The law's own potential has no force beside the law's, however far from the target.
         self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
-        demand(
-            all(map(isfinite, against.numbers.values())),
-            "the wheels' friction has no bound, because their momentum has no limit",
-        )
+        bounded = all(map(isfinite, against.numbers.values()))
+        demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
         self.larger, self.refused = list[tuple[float, float, str]](), dict[tuple[Any, ...], str]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
