@@ -119,7 +119,7 @@ def measured(loop: ClosedLoop) -> Measured | None:
     recursion: Recursion | None = tell(given[0], noise, *given[1:])
     if recursion is None:
         return None
-    told = _estimated(tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
+    told = _estimated(recursion.lag, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
     return None if told is None else Measured(told, recursion, (*sensors, *estimators), random)
 
 
@@ -155,18 +155,18 @@ def shown(sensor: Fitted) -> set[str]:
     return set(sensor.part.module.Reading._fields)
 
 
-def _estimated(tell: Any, given: Any, noise: Noise, rates: list[Any], attitudes: list[Any]) -> Told | None:
+def _estimated(lag: float, tell: Any, given: Any, noise: Noise, rates: list[Any], attitudes: list[Any]) -> Told | None:
     """Return the errors of an estimate with errors of its readings besides noise; None where it does not forget them. It
-    removes a bias of the rate."""
+    removes a bias of the rate. lag: of its recursion."""
     units = noise._replace(attitude=IDENTITY, rate=1.0, walk=0.0, more=(IDENTITY,) * len(noise.more))
     steady = [(gyro.rate - gyro.bias, gyro.turned, gyro.late) for gyro in rates[:1]] or [(0.0, 0.0, 0.0)]
     steady += [(tracker.attitude, tracker.turning, 0.0) for tracker in attitudes]
+    if not lag and not any(map(any, steady)):
+        return Told()
     gains = _gains(tell, given, units)
     if gains is None:
         return None
     towards, later, steps, kept = gains
-    if not any(later) and not any(map(any, steady)):
-        return Told()
     # Of attitude and rate: how much comes of each reading.
     (attitude, turned, hurried), (rate, rated, late) = (
         [float(np.dot(one, sizes)) for sizes in zip(*steady, strict=True)] for one in towards
