@@ -195,9 +195,10 @@ def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list
     first = every * max(1, ceil(log(SHARE) / log(max(radius, SMALL))))
     while first < lags.shape[-1]:
         # Of the gyro's errors at earlier steps too, whose whole is less.
-        wholes = np.minimum(lags[..., :1], np.where(np.arange(lags.shape[1]) == 0, lags[..., 1], np.inf)[..., None])
-        after = lags[..., first::first] / np.maximum(wholes, 1e-300)
-        kept = float((after ** (1.0 / np.arange(1, after.shape[-1] + 1))).max())
+        wholes: Array = lags[..., 0].copy()
+        wholes[:, 0] = lags[:, 0, 1]
+        after: Array = lags[..., first::first] / np.maximum(wholes, 1e-300)[..., None]
+        kept = float(np.max(after ** (1.0 / np.arange(1, after.shape[-1] + 1))))
         if kept <= 2.0 * SHARE:
             return towards, later, first, kept
         first *= 2

@@ -112,7 +112,8 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
         return (ahead, subtract(bias, scale(noise.walk, random[1]))), turn, rate
 
     def carried(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
-        return told(*errors, random)
+        turn, bias = errors
+        return told(turn, bias, random)
 
     def corrected(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         turn, bias = errors
