@@ -198,7 +198,8 @@ def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list
         wholes: Array = lags[..., 0].copy()
         wholes[:, 0] = lags[:, 0, 1]
         after: Array = lags[..., first::first] / np.maximum(wholes, 1e-300)[..., None]
-        kept = float(np.max(after ** (1.0 / np.arange(1, after.shape[-1] + 1))))
+        shares: Array = after ** (1.0 / np.arange(1, after.shape[-1] + 1))
+        kept = float(shares.max())
         if kept <= 2.0 * SHARE:
             return towards, later, first, kept
         first *= 2
