@@ -52,7 +52,7 @@ class Measured(NamedTuple):
     """The errors of an estimate, or of noisy readings that the law uses directly: besides noise, and as noise drives them;
     the parts that they come from, and whether there is noise."""
 
-    told: Told
+    amiss: Told
     recursion: Recursion
     parts: tuple[Fitted, ...]
     random: bool
@@ -71,10 +71,10 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
     and random torques from outside. None without either, and where the target depends on the law's mode."""
     if loop.target.part.flag("BY_MODE"):
         return None
-    found = measured(loop)
+    result = measured(loop)
     torques = [fitted for fitted in loop.used("environment") if noise_of(fitted, loop.period).torque]
-    if found is not None and found.random:
-        driven = Driven(found.recursion, (*found.parts, *torques))
+    if result is not None and result.random:
+        driven = Driven(result.recursion, (*result.parts, *torques))
     elif torques:
         driven = Driven(_as_read(Noise()), tuple(torques))
     else:
@@ -110,8 +110,8 @@ def measured(loop: ClosedLoop) -> Measured | None:
         noise = noise._replace(rate=reading.rate, walk=reading.walk)
     random = is_random(noise)
     if not estimators:
-        told = reduce(Told.__add__, (as_read(bound) for bound in bounds if bound is not None))
-        return Measured(told, _as_read(noise), sensors, True) if random and not noise.walk else None
+        amiss = reduce(Told.__add__, (as_read(bound) for bound in bounds if bound is not None))
+        return Measured(amiss, _as_read(noise), sensors, True) if random and not noise.walk else None
     tell: Any = estimators[0].part.hook("recursion")
     if tell is None:
         return None
@@ -119,8 +119,8 @@ def measured(loop: ClosedLoop) -> Measured | None:
     recursion: Recursion | None = tell(given[0], noise, *given[1:])
     if recursion is None:
         return None
-    told = _estimated(recursion.lag, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
-    return None if told is None else Measured(told, recursion, (*sensors, *estimators), random)
+    amiss = _estimated(recursion.lag, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
+    return None if amiss is None else Measured(amiss, recursion, (*sensors, *estimators), random)
 
 
 def bounded(fitted: Fitted, period: float, estimated: bool = False) -> Errors | None:
@@ -130,8 +130,8 @@ def bounded(fitted: Fitted, period: float, estimated: bool = False) -> Errors | 
     largest: Errors = NO_ERRORS if tell is None else tell(fitted.params)
     if tell is None or not all(map(isfinite, largest)):
         return None
-    held = 0.0 if estimated else (noise_of(fitted, period).every - 1) * period
-    return largest._replace(turning=largest.turning + held, ago=largest.ago + held)
+    between = 0.0 if estimated else (noise_of(fitted, period).every - 1) * period
+    return largest._replace(turning=largest.turning + between, ago=largest.ago + between)
 
 
 def as_read(errors: Errors) -> Told:
@@ -188,8 +188,8 @@ def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list
     radius = float(np.abs(np.linalg.eigvals(reduce(lambda one, A: A @ one, motions, np.eye(size)))).max())
     if radius >= 1.0 or (count := ceil(log(SMALL) / log(max(radius, SMALL)))) > MOST:
         return None
-    found = [_sums(steps, phase, count, size) for phase in range(every)]
-    lags = np.max([np.cumsum(one[..., ::-1], axis=-1)[..., ::-1] for one in found], axis=0) * (1.0 + 1e-6)
+    result = [_sums(steps, phase, count, size) for phase in range(every)]
+    lags = np.max([np.cumsum(one[..., ::-1], axis=-1)[..., ::-1] for one in result], axis=0) * (1.0 + 1e-6)
     # From lags of k steps on: rows for attitude and rate, columns for readings.
     towards, later = lags[..., 0].tolist(), (recursion.lag * lags[:, 0, 1]).tolist()
     first = every * max(1, ceil(log(SHARE) / log(max(radius, SMALL))))
@@ -198,7 +198,7 @@ def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list
         wholes: Array = lags[..., 0].copy()
         wholes[:, 0] = lags[:, 0, 1]
         after: Array = lags[..., first::first] / np.maximum(wholes, 1e-300)[..., None]
-        shares: Array = after ** (1.0 / np.arange(1, after.shape[-1] + 1))
+        shares: Array = np.power(after, 1.0 / np.arange(1.0, after.shape[-1] + 1.0))
         kept = float(shares.max())
         if kept <= 2.0 * SHARE:
             return towards, later, first, kept
@@ -211,8 +211,8 @@ def _sums(steps: list[Array], phase: int, count: int, size: int) -> Array:
     cycles of steps before: (2, readings, lags)."""
     every, readings = len(steps), steps[0].shape[1] // 3 - size // 3 - 1
     order = [steps[(phase + k) % every][:size, :size] for k in range(every)]
-    motion, told = reduce(lambda one, A: A @ one, order, np.eye(size)), steps[phase][size:, :size]
-    powers = np.array([told])
+    motion, amiss = reduce(lambda one, A: A @ one, order, np.eye(size)), steps[phase][size:, :size]
+    powers = np.array([amiss])
     while len(powers) < count:
         powers, motion = np.concatenate([powers, powers @ motion]), motion @ motion
     sizes = np.zeros((2, readings, every * (len(powers) + 1)))
@@ -251,13 +251,13 @@ def _matrix(step: Callable[..., Any], recursion: Recursion) -> Array:
 def _as_read(noise: Noise) -> Recursion:
     """Return the errors of readings that the law uses directly, of which attitudes are held between updates."""
 
-    def held(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+    def between(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         return errors, errors[0], scale(noise.rate, random[0])
 
     def read(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
-        return held((apply(noise.attitude, random[2]),), random)
+        return between((apply(noise.attitude, random[2]),), random)
 
-    return Recursion(read, held, noise.every, 1)
+    return Recursion(read, between, noise.every, 1)
 
 
 def _rate(loop: ClosedLoop) -> Vector:

@@ -99,7 +99,7 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     for fitted in _acting(loop):
         for pushed, push in zip((torques, errors), _pushes(fitted, envelope), strict=True):
             pushed += [] if push is None else [push]
-    attitude, rate, *more = reduce(Told.__add__, [told for _, told in _told(loop)], Told())
+    attitude, rate, *more = reduce(Told.__add__, [amiss for _, amiss in _told(loop)], Told())
     (torque, per_rate), (command, command_per_rate) = (
         [sum(x) for x in zip(*pushed, strict=True)] for pushed in (torques, errors)
     )
@@ -111,19 +111,19 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
 
 def _told(loop: ClosedLoop) -> list[tuple[tuple[Fitted, ...], Told]]:
     """Return the errors of what a law is told besides noise, with the parts that they come from."""
-    found = measured(loop)
-    together = () if found is None else found.parts
-    told = [] if found is None else [(together, found.told)]
+    result = measured(loop)
+    together = () if result is None else result.parts
+    amiss = [] if result is None else [(together, result.amiss)]
     for f in _acting(loop):
         # A part that is left out for its noise is left out with its other errors.
         errors = None if f in together or is_random(noise_of(f, loop.period)) else bounded(f, loop.period)
-        told += [] if errors is None else [((f,), as_read(errors))]
-    return told
+        amiss += [] if errors is None else [((f,), as_read(errors))]
+    return amiss
 
 
 def grows(loop: ClosedLoop) -> bool:
     """Whether errors of what a law is told grow as the body moves."""
-    return any(told.grows for _, told in _told(loop))
+    return any(amiss.grows for _, amiss in _told(loop))
 
 
 def late_torque(loop: ClosedLoop) -> Late | None:
@@ -177,7 +177,7 @@ def assumed_away(loop: ClosedLoop) -> list[str]:
 
 def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple[Claim, ...]:
     """Return the claims with an assumption for each part that they leave out."""
-    away, driven, told = assumed_away(loop), driven_errors(loop), _told(loop)
+    away, driven, amiss = assumed_away(loop), driven_errors(loop), _told(loop)
 
     def more(claim: Claim) -> tuple[str, ...]:
         if claim.kind == DETUMBLING and claim.outcome == "proved":
@@ -191,9 +191,9 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         there = (*noisy, *moved, *(_moving(loop) if claim.numbers.get("late_torque") else ()))
         grown = "told_growth" in claim.numbers
         # What grows is in the claim or the parts are not, nor is what noise drives of them.
-        left = [f for parts, one in told if one.grows and not grown for f in parts]
+        left = [f for parts, one in amiss if one.grows and not grown for f in parts]
         left += [] if driven is None or noisy else driven.parts
-        telling = [f for parts, _ in told for f in parts if f not in left]
+        telling = [f for parts, _ in amiss for f in parts if f not in left]
         there = [f for f in (*there, *telling) if f not in left]
         absent = [f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope))]
         estimated = any(f in telling for f in loop.used("estimator"))

@@ -214,8 +214,8 @@ class Held(Follower):
         speeds = dict.fromkeys(("q0", *STATE[TURN]), w / 2) | dict.fromkeys(MOMENTA, w * self.size("h"))
         return speeds | {x: sizes[f"u{k + 1}"] + most(self.bend[k], sizes) for k, x in enumerate(STATE[RATE])}
 
-    def tube(self, region: Region, told: list[Fraction] | None = None) -> Tube:
-        """Return what motions stay in for a period. told: how much more attitude and rate are off that the law is told as
+    def tube(self, region: Region, amiss: list[Fraction] | None = None) -> Tube:
+        """Return what motions stay in for a period. amiss: how much more attitude and rate are off that the law is told as
         the body moves, by default a little more than after a motion that did not leave the tube."""
         sizes = region.sizes
         near = sizes | {"v": 1 - region.least}
@@ -238,7 +238,7 @@ class Held(Follower):
             steady = [x + rigid for x in self.misread(where)]
             return where, list(map(up, steady)) if self.grows else steady
 
-        begun, bound = told or [ZERO, ZERO], told or not self.grows
+        begun, bound = amiss or [ZERO, ZERO], amiss or not self.grows
         read = misread([ZERO] * 4 + begun)
 
         def reached(bounds: list[Fraction]) -> list[Fraction]:

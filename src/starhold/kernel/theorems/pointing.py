@@ -246,13 +246,13 @@ def waited(motion: Held, before: Tube, after: Tube) -> int:
     forgotten which the body did in the tube before."""
     if not motion.grows:
         return 0
-    told, end = ([tube.region.sizes[x] for x in AMISS] for tube in (before, after))
+    amiss, end = ([tube.region.sizes[x] for x in AMISS] for tube in (before, after))
     for k in range(ROUNDS):
-        if all(x <= y for x, y in zip(told, end, strict=True)):
+        if all(x <= y for x, y in zip(amiss, end, strict=True)):
             return k * max(1, ceil(motion.ago / motion.h))
-        tube = motion.tube(after.region, told)
+        tube = motion.tube(after.region, amiss)
         less = motion.misleading(tube)
-        told = [min(x, up(y + motion.held_back * (x - y))) for x, y in zip(told, less, strict=True)]
+        amiss = [min(x, up(y + motion.held_back * (x - y))) for x, y in zip(amiss, less, strict=True)]
     raise RefusedError("errors are not forgotten")
 
 

@@ -106,20 +106,20 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
     (_, axes, drift), share = turned(rate, period), 1.0 / (1 + len(noise.more))
     seen = [product(diagonal((share, share, share)), root) for root in (noise.attitude, *noise.more)]
 
-    def told(turn: Vector, bias: Vector, random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+    def amiss(turn: Vector, bias: Vector, random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         rate = subtract(scale(noise.rate, random[0]), bias)
         ahead = subtract(apply(axes, turn), apply(drift, rate))
         return (ahead, subtract(bias, scale(noise.walk, random[1]))), turn, rate
 
     def carried(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         turn, bias = errors
-        return told(turn, bias, random)
+        return amiss(turn, bias, random)
 
     def corrected(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         turn, bias = errors
         off = subtract(reduce(add, map(apply, seen, random[2:])), turn)
         turn = add(turn, scale(params.attitude_gain, off))
-        return told(turn, subtract(bias, scale(params.bias_gain * period, off)), random)
+        return amiss(turn, subtract(bias, scale(params.bias_gain * period, off)), random)
 
     return Recursion(corrected, carried, noise.every, 2, 2 + len(seen), 0.5 * period)
 
