@@ -18,12 +18,13 @@ from starhold.certification.evidence.starts import POINTS
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
+from starhold.certification.measured import driven_errors
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import (
+    GROWING,
     LARGER,
     Pushes,
     change_of_modelled,
-    driven_errors,
     late_torque,
     noisy_fields,
     samples_of,
@@ -113,6 +114,8 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if claim["theorem"] in BOUNDED:
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
+        # Without what grows as the body moves its parts are left out by name.
+        known = replace(known, lags=not numbers.keys().isdisjoint(GROWING))
         pushed = known.against(envelope).numbers
         if "share" in numbers and (driven := driven_errors(loop)) is not None:
             pushed[DEVIATION] = driven.torque

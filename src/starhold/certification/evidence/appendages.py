@@ -90,7 +90,7 @@ class Swinging:
             raise RefusedError("the law is told a torque from outside")
         if any(f.part.flag("ACTS") for f in loop.loop.used("effector")):
             raise RefusedError("an effector takes the command")
-        against = pushes(loop.loop, loop.known.envelope(False))
+        against = pushes(loop.loop, loop.known.envelope(False)).steady
         outside = float(exact(against.outside) + exact(above(loop.known.modelled_norm)) + exact(loop.known.disturbance))
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
