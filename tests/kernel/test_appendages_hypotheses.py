@@ -44,6 +44,17 @@ def nearer(content, claim):
     scaled(("end.angle", "1/100"), ("end.rate", "1/100"))(content, claim)
 
 
+def small_response(part, end, gain, share):
+    """The loop is said to move less under pushes."""
+
+    def change(content, claim):
+        gains = claim["evidence"]["response"]["gains"]
+        gains[part] = [str(rational(x) * Fraction(gain)) for x in gains[part]]
+        scaled((end, share))(content, claim)
+
+    return change
+
+
 def reversed_torque(content, claim):
     """A torque about the third axis of more than the half of what is felt turns the body the other way."""
     program = copy.deepcopy(content["programs"].pop(claim["programs"]["motion"]))
@@ -81,10 +92,13 @@ FALSE = {
     "turns from rest": ("bent", scaled(("angle", "3/2"))),
     "samples": ("bent", at_once),
     "between samples": ("biased", nearer),
+    "response of the rate": ("biased", small_response(0, "end.rate", "2/5", "3/5")),
+    "response of the turn": ("biased", small_response(1, "end.angle", "3/5", "13/20")),
+    "response of the acceleration": ("biased", small_response(2, "end.rate", "1/100", "4/5")),
     "held torque": ("bent", reversed_torque),
     "highest V": ("bent", lower),
     "limit": ("bent", scaled(("limit", "1/20"))),
-    "end of the angle": ("biased", scaled(("end.angle", "1/10"))),
+    "end of the angle": ("biased", scaled(("end.angle", "9/10"))),
     "end of the rate": ("biased", scaled(("end.rate", "1/1000"))),
     "settling": ("bent", scaled(("settling", "1/1000"))),
 }

@@ -12,18 +12,18 @@ from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate
+from operator import mul
 from typing import NamedTuple
 
 from .loops import AXES, IS_VALID, AttitudeLoop
-from .numbers import Rows, added, demand, inverse, norm, plus, reach, root, scalar, shortened, times, transpose, up
+from .numbers import Account, Rows, added, demand, inverse, norm, plus, reach, root, scalar, shortened, times, transpose, up
 from .regions import stretch
-from .taylor import Model, add, beyond, multiply, negative, number, run, slope, within
+from .taylor import PLACES, Model, add, beyond, multiple, multiply, negative, number, run, slope, within
 from .taylor import root as root_of
 
-MOST, LONGEST, FINE, TINY, LITTLE, PLACES = 40, 16, 2**64, Fraction(1, 2**20), Fraction(1, 2**200), 100
+MOST, LONGEST, FINE, TINY, LITTLE = 40, 16, 2**64, Fraction(1, 2**20), Fraction(1, 2**200)
 """How many states appendages may have; how far the motion of a period may be; the share of it at which a series ends; the
-size of inputs of which slopes at zero are read; the least number of a matrix of bounds that is not zero; the places of the
-linear motion."""
+size of inputs of which slopes at zero are read; the least number of a matrix of bounds that is not zero."""
 HALF, ZERO = Fraction(1, 2), Fraction(0)
 Column = list[Fraction]
 
@@ -49,7 +49,7 @@ class Left(NamedTuple):
 class Period(NamedTuple):
     """Samples with |y_k| <= r_k are followed by ones with |y| <= grown r + more, the states until then are at
     most between r + far, torques with all errors torque r + pushed, and the command torque r + commanded, of which
-    law r + law_rest is what is not linear in what is told. Beside the linear motion the rates are at most `over`; torques from
+    law r + law_rest is what is not linear in what is told. Rates differ from the linear ones by `over` at most; torques from
     outside are no more than `outside`, and errors of the command and of what is told no more than `error`."""
 
     grown: Rows
@@ -152,11 +152,12 @@ class Appended:
         while last * top * FINE > 1:
             terms, last = terms + 1, last * a / (terms + 3)
         self.tail = up(h * last * top)
+        self.pull = plus(A, times(self.B, self.K), -1)[:3]
         forward, power, share = plus(times(A, V), times(self.B, KV), -1), scalar(1, self.n), h
         end, held_torque, spans = V, [[ZERO] * 3 for _ in A], sized(V, alone, blocks)
         given, carry, filtered = held_torque, [[ZERO] * self.n for _ in A], [[ZERO] * self.n for _ in blocks]
-        nudged, bent, struck = [ZERO] * self.n, [ZERO] * self.n, [ZERO] * len(blocks)
-        self.start, hurry = short(spans), sized(forward[:3], axes, blocks)
+        nudged, bent, struck, middle = [ZERO] * self.n, [ZERO] * self.n, [ZERO] * len(blocks), held_torque
+        self.start, hurry = short(spans), sized([[ZERO] * self.n] * 3, axes, blocks)
         for m in range(terms + 1):
             moved, pushed = times(power, forward), times(power, self.B)
             end, held_torque = plus(end, moved, share), plus(held_torque, pushed, share)
@@ -166,7 +167,10 @@ class Appended:
             # Torques from outside come from any side, and turn over at any time.
             lengths, turned = list(map(norm, pushed)), parted(times(W, pushed), blocks)
             nudged = [x + share * y for x, y in zip(nudged, lengths, strict=True)]
-            bent = [x + share * ((m + 1) * m * (m - 1)) / 12 * y for x, y in zip(bent, lengths, strict=True)]
+            # A curve is h^2/8 of its second derivative from a line, which is near that in the middle of the period.
+            curve, in_middle = share * ((m + 1) * m * (m - 1)) / 12, Fraction(4, 2**m)
+            bent = [x + curve * (1 - in_middle) * y for x, y in zip(bent, lengths, strict=True)]
+            middle = plus(middle, pushed, curve * in_middle)
             struck = [x + share * norm(y for row in rows for y in row) for x, rows in zip(struck, turned, strict=True)]
             hurry = plus(hurry, sized(times(A[:3], moved), axes, blocks), share)
             power, share = times(A, power), share * h / (m + 2)
@@ -180,11 +184,11 @@ class Appended:
         self.spans, self.given, self.feedback = short(spans), short(given), short(sized(KV, axes, blocks))
         rest = self.tail * max(map(norm, self.B))
         self.nudged, self.struck = combined(nudged, [rest] * self.n), combined(struck, [rest * x for x in self.widths])
-        # What torques from outside do differs from the line between what they do at the ends of a period.
-        rest *= 1 + a + Fraction((terms + 2) * (terms + 1) * terms, 12)
+        rest *= a / 2 + Fraction((terms + 2) * (terms + 1) * terms, 12)
         self.bent, self.hurry = combined(bent, [rest] * self.n), short(hurry)
         final = plus(self.B, times(A, whole_period))
-        self.ways = [shortened(x, PLACES) for x in ([[h / 2 * x for x in row] for row in self.B], [[h / 2 * x for x in row] for row in final], whole_period)]
+        ends = ([[h / 2 * x for x in row] for row in rows] for rows in (self.B, final))
+        self.ways = [shortened(rows, PLACES) for rows in (*ends, middle, whole_period)]
         self.sampled = shortened(times(end, W), PLACES)
 
     def begun(self, X: Rows, appendages: Column) -> Column:
@@ -228,14 +232,14 @@ class Appended:
         return self.tail * max(combined(image(sizes_of(self.A), box.state), image(sizes_of(self.B), box.torque)))
 
     def beside(self, period: Period, box: Box, held: Fraction) -> Column:
-        """Return what a period at most adds to samples beside what `sampled` and `ways` make of them, of torques from outside
-        and of torques `held` in error."""
-        rounded = added([*box.state, 6 * period.outside, 3 * held]) / 2**PLACES
+        """Return what a period at most adds to what `sampled` makes of samples, and `ways` of torques from outside and of
+        torques `held` in error."""
+        rounded = added([*box.state, 9 * period.outside, 3 * held]) / 2**PLACES
         shaken = [period.outside * x + self.unseries(box) + rounded for x in self.bent]
         return combined(image(self.carry, period.over), shaken)
 
     def hurried(self, period: Period, box: Box, radii: Column, held: Fraction) -> Fraction:
-        """Return a bound of |w'| at all times."""
+        """Return a bound of how far w' is at all times from what is linear in the last sample."""
         moved = combined(image(self.given, [held] * 3), image(self.carry, period.over))
         moved = [x + period.outside * y + self.unseries(box) for x, y in zip(moved, self.nudged, strict=True)]
         torques = [(held + period.outside) * norm(row) for row in self.B[:3]]
@@ -289,12 +293,19 @@ def longer(block: Rows) -> Fraction:
 
 
 def follow(period: Period, begun: Column, periods: int) -> tuple[Column, Column]:
-    """Return bounds of samples at the start of each of so many periods, the first of which is told, and after them."""
-    largest = begun
+    """Return bounds of samples at the start of each of so many periods, the first of which is told, and after them. They are
+    in whole multiples, rounded up."""
+    rows, (now, more) = (
+        [list(map(multiple, row)) for row in period.grown],
+        (list(map(multiple, x)) for x in (begun, period.more)),
+    )
+    largest = now
     for k in range(periods):
-        largest = list(map(max, largest, begun)) if k else largest
-        begun = combined(image(period.grown, begun), period.more)
-    return largest, begun
+        Account.spend(len(now) ** 2, 2 * PLACES)
+        largest = list(map(max, largest, now)) if k else largest
+        now = [x - (-sum(map(mul, row, now)) >> PLACES) for row, x in zip(rows, more, strict=True)]
+    most, last = ([Fraction(x, 1 << PLACES) for x in column] for column in (largest, now))
+    return most, last
 
 
 def after(period: Period, begun: Column, periods: int) -> Column:

@@ -26,8 +26,8 @@ from starhold.kernel.appended import Appended, Box, Column, Period, after, combi
 from starhold.kernel.loops import TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, norm
 from starhold.kernel.polynomials import most, var
-from starhold.kernel.theorems.appendages import FOLLOWED, KINDS, PARTS, inner, responds, settled, sized
-from starhold.kernel.theorems.response import MOST, Response
+from starhold.kernel.theorems.appendages import FOLLOWED, KINDS, inner, responds, settled, sized
+from starhold.kernel.theorems.response import MOST, PARTS, Response
 
 APPENDED = "points with appendages"
 Array = NDArray[np.float64]
@@ -134,8 +134,8 @@ class Swinging:
     def response(self) -> tuple[dict[str, Any], Response] | None:
         """Return the evidence about the response, and what it shows; None if it lasts too long."""
         A, ways = floats(self.motion.sampled), list(map(floats, self.motion.ways))
-        rows = powers(np.eye(self.motion.n)[:6], A, MOST)
-        sizes = np.abs(rows).max(axis=2)
+        rows = powers(np.vstack([np.eye(self.motion.n)[:6], floats(self.motion.pull)]), A, MOST)
+        sizes = np.abs(rows[:, :6]).max(axis=2)
         (gone,) = np.nonzero((sizes < LEFT * sizes.max(axis=0)).all(axis=1))
         if not len(gone):
             return None

@@ -11,14 +11,14 @@ from ..near import form_of
 from ..numbers import Rows, added, definite, demand, inverse, matrix, norm, rational, reach, read_list, read_table, scalar
 from ..polynomials import minus, most, var
 from ..reading import Claim
-from ..regions import RATE, STATE, TURN
+from ..regions import STATE
 from ..rules import Exceeds, Part, Proof, vanish
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
 from .pointing import HALF_TURN, bounded_motion
-from .response import Response, summed
+from .response import PARTS, Response, summed
 
-PARTS, KINDS = {"rate": RATE, "turn": TURN}, ((0, 1), (2,))
+KINDS = (0, 1), (2,), (3,)
 ROUNDS, FOLLOWED = 32, 1024
 """The most rounds, and up to how many periods of one are followed one by one."""
 
@@ -104,24 +104,22 @@ def points_with_appendages(claim: Claim) -> Proof:
 
 
 def responds(motion: Appended, weights: object, gains: object) -> Part[Response]:
-    """The gains are no less than those of the linear motion of body and appendages: of rates and turns, under torques from
-    outside, which are free in a period, and under those held in error."""
-    return summed(scalar(1, motion.n)[:6], PARTS, motion.sampled, motion.ways, KINDS, weights, gains)
+    """The gains are no less than those of the linear motion of body and appendages: of rates, turns and the acceleration
+    that is linear in it, under torques from outside, which are free in a period, and under those held in error."""
+    return summed(scalar(1, motion.n)[:6] + motion.pull, PARTS, motion.sampled, motion.ways, KINDS, weights, gains)
 
 
-def settled(
-    motion: Appended, response: Response, period: Period, box: Box, radii: Column
-) -> tuple[Fraction, Fraction]:
+def settled(motion: Appended, response: Response, period: Period, box: Box, radii: Column) -> tuple[Fraction, Fraction]:
     """Return bounds of |w| and |q| at all times from so many samples in a box on."""
     held = period.error + norm(combined(image(period.law, radii), period.law_rest))
-    rest, pushes = motion.beside(period, box, held), (period.outside, held)
-    wide, turned = (
+    rest, pushes = motion.beside(period, box, held), (period.outside, period.outside, held)
+    wide, turned, pulled = (
         added([gain * b for gain, b in zip(gains, pushes, strict=True)])
         + norm(combined(reach(response.beside[part], rest), reach(response.left[part], box.state)))
         for gains, part in zip(response.gains, PARTS.values(), strict=True)
     )
     # Each time is at most h/2 from a sample, and |q''| <= |w'|/2 + |w|^2 |q|/4.
-    h, hurried = motion.h, motion.hurried(period, box, radii, held)
+    h, hurried = motion.h, pulled + motion.hurried(period, box, radii, held)
     bent = hurried + norm(box.state[:3]) ** 2 * norm(box.state[3:6]) / 2
     return wide + h / 2 * hurried, turned + h * h / 16 * bent
 

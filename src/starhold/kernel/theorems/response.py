@@ -38,8 +38,8 @@ Sparse = list[list[tuple[int, int]]]
 
 @dataclass(frozen=True)
 class Response:
-    """So many samples of z+ = Az + the sum of B v, |v| <= b: how large parts of what is bounded become for b = 1, of each kind
-    of pushes, what is left of the first sample, and how large all is made, row by row, of what else each sample adds."""
+    """So many samples of z+ = Az + the sum of B v, |v| <= b: how large parts of what is bounded become for b = 1, of each
+    kind of pushes, what is left of the first sample, and how large, row by row, what else each sample adds makes it."""
 
     count: int
     gains: list[list[Fraction]]
@@ -83,9 +83,9 @@ def summed(
     weights: Any,
     gains: Any,
 ) -> Part[Response]:
-    """The gains are no less than those of z+ = Az + the sum of B v. kinds: of each kind of pushes the places of its B, of three
-    columns. weights: m_k, for each part of what is bounded. Of the sum x of C_k B v_k (y.x)^2 is no more than the sum of 1/m_k
-    times that of m_k |B'C_k'y|^2 (Cauchy and Schwarz)."""
+    """The gains are no less than those of z+ = Az + the sum of B v. kinds: of each kind of pushes the places of its B, of
+    three columns. weights: m_k, for each part of what is bounded. Of the sum x of C_k B v_k (y.x)^2 is no more than the sum
+    of 1/m_k times that of m_k |B'C_k'y|^2 (Cauchy and Schwarz)."""
     (moved, below), (B, under) = columns(A), columns(reduce(beside, ways))
     count = len(read_list(read_list(weights, len(parts))[0]))
     demand(0 < count <= MOST, "a response has no samples, or too many")
