@@ -30,6 +30,11 @@ TELLING = [
     {"type": "star-tracker", "cross": 0, "roll": 0, "mounting_error": [1e-4, 0, 0]},
     {"type": "constant-torque", "torque": [1e-4, 2e-4, -1e-4]},
 ]
+OVERDAMPED = BENDING | {
+    "spacecraft": {"inertia": MOMENTS},
+    "part": [BENDING["part"][0], {"type": "constant-torque", "torque": [0.0, 1e-3, 0.0]}],
+    "law": [{"type": "lyapunov", "k_rate": 335.0, "k_attitude": 30.0}],
+}
 BIASED = BENDING | {"part": [*BENDING["part"], *TELLING]}
 SUBSTEPS = 1
 
@@ -39,7 +44,7 @@ def loop_of(name):
     if name == "panels":
         scenario = sh.load("flexible-slew")
         return build(scenario, scenario.laws[0])
-    scenario = make_scenario({"name": "bending", **{"bent": BENDING, "biased": BIASED}[name]})
+    scenario = make_scenario({"name": "bending", **{"bent": BENDING, "biased": BIASED, "overdamped": OVERDAMPED}[name]})
     return build(scenario, scenario.laws[0])
 
 
@@ -239,8 +244,8 @@ class Swaying:
         return x
 
     def responses(self, parts):
-        """What a period does near rest, by differences of flown ones: to (w, q, v), and what pushes from outside in each of its
-        parts, errors of the command, and errors of the attitude and of the rate that the law is told make of it."""
+        """What a period does near rest, by differences of flown ones: to (w, q, v), and what pushes from outside in each of
+        its parts, errors of the command, and errors of the attitude and of the rate that the law is told make of it."""
         e, n, none = 1e-6, self.n, np.zeros((3, self.n))
 
         def slope(z, vectors):

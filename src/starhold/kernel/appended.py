@@ -21,9 +21,10 @@ from .regions import stretch
 from .taylor import PLACES, Model, add, beyond, multiple, multiply, negative, number, run, slope, within
 from .taylor import root as root_of
 
-MOST, LONGEST, FINE, TINY, LITTLE = 40, 16, 2**64, Fraction(1, 2**20), Fraction(1, 2**200)
+MOST, LONGEST, FINE, TINY, LITTLE, SHORT = 40, 16, 2**64, Fraction(1, 2**20), Fraction(1, 2**200), 48
 """How many states appendages may have; how far the motion of a period may be; the share of it at which a series ends; the
-size of inputs of which slopes at zero are read; the least number of a matrix of bounds that is not zero."""
+size of inputs of which slopes at zero are read; the least number of a matrix of bounds that is not zero; the places of
+slopes."""
 HALF, ZERO = Fraction(1, 2), Fraction(0)
 Column = list[Fraction]
 
@@ -82,9 +83,10 @@ class Appended:
         A = [row[: self.n] for row in slopes]
         turning = [[HALF * (i == k) for k in range(self.n)] for i in AXES]
         B, none = [row[self.n :] for row in slopes], [[ZERO] * 3] * 3
-        self.A, self.B = [*A[:3], *turning, *A[3:]], [*B[:3], *none, *B[3:]]
+        # All that follows holds of any A, B and K.
+        self.A, self.B = (shortened(x, SHORT) for x in ([*A[:3], *turning, *A[3:]], [*B[:3], *none, *B[3:]]))
         # The law's torque is -Kz near rest.
-        self.K = [[-slope(x, TINY, k) for k in range(self.n)] for x in self.command(small)]
+        self.K = shortened([[-slope(x, TINY, k) for k in range(self.n)] for x in self.command(small)], SHORT)
 
     def rates(self, state: Column, torque: Column) -> list[Model]:
         """Return models of w' and v' where states and torques are no larger than told."""
@@ -151,15 +153,17 @@ class Appended:
         terms, last, top = 0, a / 2, 3 ** -(-a.numerator // a.denominator)
         while last * top * FINE > 1:
             terms, last = terms + 1, last * a / (terms + 3)
-        self.tail = up(h * last * top)
+        # Of the terms (Ah)^m/m! each entry is rounded down, which takes none further off than by this times e^a.
+        places = PLACES + top.bit_length()
+        self.tail = up(h * top * (last + Fraction(self.n * (terms + 1), 1 << places)))
         self.pull = plus(A, times(self.B, self.K), -1)[:3]
-        forward, power, share = plus(times(A, V), times(self.B, KV), -1), scalar(1, self.n), h
+        forward, power = plus(times(A, V), times(self.B, KV), -1), scalar(1, self.n)
         end, held_torque, spans = V, [[ZERO] * 3 for _ in A], sized(V, alone, blocks)
         given, carry, filtered = held_torque, [[ZERO] * self.n for _ in A], [[ZERO] * self.n for _ in blocks]
         nudged, bent, struck, middle = [ZERO] * self.n, [ZERO] * self.n, [ZERO] * len(blocks), held_torque
         self.start, hurry = short(spans), sized([[ZERO] * self.n] * 3, axes, blocks)
         for m in range(terms + 1):
-            moved, pushed = times(power, forward), times(power, self.B)
+            share, moved, pushed = h / (m + 1), times(power, forward), times(power, self.B)
             end, held_torque = plus(end, moved, share), plus(held_torque, pushed, share)
             spans, given = plus(spans, sized(moved, alone, blocks), share), plus(given, sizes_of(pushed), share)
             carry = plus(carry, sizes_of(power), share)
@@ -168,12 +172,12 @@ class Appended:
             lengths, turned = list(map(norm, pushed)), parted(times(W, pushed), blocks)
             nudged = [x + share * y for x, y in zip(nudged, lengths, strict=True)]
             # A curve is h^2/8 of its second derivative from a line, which is near that in the middle of the period.
-            curve, in_middle = share * ((m + 1) * m * (m - 1)) / 12, Fraction(4, 2**m)
+            curve, in_middle = h * (m * (m - 1)) / 12, Fraction(4, 2**m)
             bent = [x + curve * (1 - in_middle) * y for x, y in zip(bent, lengths, strict=True)]
             middle = plus(middle, pushed, curve * in_middle)
             struck = [x + share * norm(y for row in rows for y in row) for x, rows in zip(struck, turned, strict=True)]
             hurry = plus(hurry, sized(times(A[:3], moved), axes, blocks), share)
-            power, share = times(A, power), share * h / (m + 2)
+            power = shortened([[share * x for x in row] for row in times(A, power)], places)
         # A block of two is no longer than 3/2 times the larger one of its components.
         largest = [max(map(total, rows)) for rows in parted(W, blocks)]
         self.widths = [up(x * (size + 1) / 2) for x, size in zip(largest, blocks, strict=True)]
@@ -301,7 +305,7 @@ def follow(period: Period, begun: Column, periods: int) -> tuple[Column, Column]
     )
     largest = now
     for k in range(periods):
-        Account.spend(len(now) ** 2, 2 * PLACES)
+        Account.spend(len(now) ** 2 // 4, 2 * PLACES)
         largest = list(map(max, largest, now)) if k else largest
         now = [x - (-sum(map(mul, row, now)) >> PLACES) for row, x in zip(rows, more, strict=True)]
     most, last = ([Fraction(x, 1 << PLACES) for x in column] for column in (largest, now))
