@@ -270,7 +270,7 @@ class Swaying:
         ways[0][part] = along(ends)
         while (np.abs(ways[-1][:6]).max() > left or len(ways) < 50) and len(ways) < 20000:
             ways.append(A.T @ ways[-1])
-        x = self.state(np.zeros((ends.shape[1], 6)), np.zeros((ends.shape[1], self.count)))
+        x = self.resting(ends.shape[1])
         sizes = [*["outside"] * parts, "error", "error.attitude", "error.rate"]
         for way in reversed(ways):
             fast = np.linalg.norm(x[4:7], axis=0)
@@ -279,6 +279,10 @@ class Swaying:
             x = self.after(x, chosen[:parts], *chosen[parts:])
         turned = 2 * np.arcsin(np.linalg.norm(x[1:4], axis=0))
         return turned / self.numbers["end.angle"], np.linalg.norm(x[4:7], axis=0) / self.numbers["end.rate"]
+
+    def resting(self, lanes):
+        """States on target."""
+        return self.state(np.zeros((lanes, 6)), np.zeros((lanes, self.count)))
 
     def worst(self, rounds=3):
         """The largest angle of steered flights, in directions at random and then about the worst of them, as a share."""
