@@ -30,11 +30,6 @@ TELLING = [
     {"type": "star-tracker", "cross": 0, "roll": 0, "mounting_error": [1e-4, 0, 0]},
     {"type": "constant-torque", "torque": [1e-4, 2e-4, -1e-4]},
 ]
-OVERDAMPED = BENDING | {
-    "spacecraft": {"inertia": MOMENTS},
-    "part": [BENDING["part"][0], {"type": "constant-torque", "torque": [0.0, 1e-3, 0.0]}],
-    "law": [{"type": "lyapunov", "k_rate": 335.0, "k_attitude": 30.0}],
-}
 BIASED = BENDING | {"part": [*BENDING["part"], *TELLING]}
 SUBSTEPS = 1
 
@@ -44,7 +39,7 @@ def loop_of(name):
     if name == "panels":
         scenario = sh.load("flexible-slew")
         return build(scenario, scenario.laws[0])
-    scenario = make_scenario({"name": "bending", **{"bent": BENDING, "biased": BIASED, "overdamped": OVERDAMPED}[name]})
+    scenario = make_scenario({"name": "bending", **{"bent": BENDING, "biased": BIASED}[name]})
     return build(scenario, scenario.laws[0])
 
 

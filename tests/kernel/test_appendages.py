@@ -259,8 +259,20 @@ def test_gains_are_the_sums_of_the_impulse_response(name):
         rows = rows @ moved
     for k, (chord, bent, late) in enumerate(told["gains"]):
         part = slice(3 * k, 3 * k + 3)
-        assert free[part].max() <= number(chord) + number(bent) < 1.1 * free[part].max()
-        assert error[part].max() <= number(late) < 1.1 * error[part].max()
+        # In a direction between the axes rates and acceleration may be larger.
+        wide = 1.04 if k == 1 else 1.4
+        assert free[part].max() <= number(chord) + number(bent) < wide * free[part].max()
+        assert error[part].max() <= number(late) < wide * error[part].max()
+
+
+@pytest.mark.parametrize("part", ["rate", "turn", "acceleration"])
+def test_a_gain_that_is_too_small_is_refused(part):
+    content = copy.deepcopy(content_of("bent"))
+    (claim,) = content["claims"]
+    gains = claim["evidence"]["response"]["gains"]
+    place = ["rate", "turn", "acceleration"].index(part)
+    gains[place] = [str(number(x) * Fraction(95, 100)) for x in gains[place]]
+    assert failing(claim, content["programs"]) == {f"response of the {part}"}
 
 
 def without_left(monkeypatch):
@@ -294,13 +306,16 @@ def test_what_is_not_linear_counts_in_a_response():
     x = against.state(z[:, :6], z[:, 6:])
     reached = swinging.reached([Fraction(float(r.max())) for r in against.modes(x)], None)
     box = appended.Box(*[[2 * size + Fraction(1, 50) for size in part] for part in reached], [Fraction(1, 4)] * motion.n)
-    rest = np.array(motion.beside(motion.period(box), box, Fraction(0)), dtype=float)
+    period = motion.period(box)
+    rest, less = (
+        np.array(motion.beside(one, box, Fraction(0)), dtype=float)[:, None] + 1e-9
+        for one in (period, period._replace(over=none([period.over])[0]))
+    )
     none_of = np.zeros((3, 200))
     later = against.after(x, [none_of] * 4, none_of, none_of, none_of)
     far = np.vstack([later[4:7], later[1:4], later[7:]]) - np.array(motion.sampled, dtype=float) @ z.T
-    assert (np.abs(far) <= rest[:, None] + 1e-9).all()
-    # Without what is not linear nothing of it would be allowed.
-    assert np.abs(far[:3]).max() > 1e-3 * rest[:3].max() > 0.0
+    assert (np.abs(far) <= rest).all()
+    assert (np.abs(far) > 10.0 * less)[:6].any(axis=1).all()
 
 
 EACH = ("outside", "error", "error.attitude", "error.rate")

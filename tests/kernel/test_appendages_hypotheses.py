@@ -94,7 +94,6 @@ FALSE = {
     "between samples": ("biased", nearer),
     "response of the rate": ("biased", small_response(0, "end.rate", "2/5", "3/5")),
     "response of the turn": ("biased", small_response(1, "end.angle", "3/5", "13/20")),
-    "response of the acceleration": ("overdamped", small_response(2, "end.rate", "1/10000", "3/5")),
     "held torque": ("bent", reversed_torque),
     "highest V": ("bent", lower),
     "limit": ("bent", scaled(("limit", "1/20"))),
