@@ -19,7 +19,7 @@ from starhold.certification.evidence.attitude import Loop
 from starhold.certification.subject import make_subject
 from starhold.kernel import appended
 from starhold.kernel.check import check
-from starhold.kernel.numbers import Account, RefusedError
+from starhold.kernel.numbers import Account, RefusedError, rational
 from starhold.kernel.programs import Program, digest
 from starhold.kernel.taylor import ONE, run, within
 from starhold.kernel.theorems.response import Response
@@ -271,7 +271,7 @@ def test_a_gain_that_is_too_small_is_refused(part):
     (claim,) = content["claims"]
     gains = claim["evidence"]["response"]["gains"]
     place = ["rate", "turn", "acceleration"].index(part)
-    gains[place] = [str(number(x) * Fraction(95, 100)) for x in gains[place]]
+    gains[place] = [str(rational(x) * Fraction(95, 100)) for x in gains[place]]
     assert failing(claim, content["programs"]) == {f"response of the {part}"}
 
 

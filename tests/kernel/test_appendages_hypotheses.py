@@ -30,17 +30,25 @@ def lower(content, claim):
     claim["numbers"]["highest"] = str(rational(claim["numbers"]["level"]) / 2)
 
 
+def boxed(content, claim):
+    """Motions end in the last box, which is larger than what the response says."""
+    claim["evidence"].pop("response")
+    scaled(("end.angle", "8"), ("end.rate", "8"))(content, claim)
+
+
 def at_once(content, claim):
     """The motion is where it ends after a period of each round."""
     for one in claim["evidence"]["rounds"][:-1]:
         one["periods"] = 1
     claim["numbers"]["settling"] = str(rational(claim["numbers"]["period"]) * len(claim["evidence"]["rounds"]))
+    boxed(content, claim)
 
 
 def nearer(content, claim):
-    """The last box, and what is claimed of the end, are a hundred times smaller, and so is all at samples."""
+    """The last box is a hundred times smaller, and what is claimed of the end is that."""
     last = claim["evidence"]["rounds"][-1]
     last["sizes"] = [str(Fraction(x) / 100) for x in last["sizes"]]
+    boxed(content, claim)
     scaled(("end.angle", "1/100"), ("end.rate", "1/100"))(content, claim)
 
 
