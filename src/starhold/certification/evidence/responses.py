@@ -50,9 +50,9 @@ def weighed(
     for part in parts.values():
         rows = responses[:, part]
         squares = [G @ G.transpose(0, 2, 1) for G in (rows @ one for one in ways)]
-        weights = np.minimum(np.rint(FINEST * weigh(sum(squares[n] for n in kinds[0]))), LONGEST)
+        weights = np.minimum(np.rint(FINEST * weigh(np.sum([squares[n] for n in kinds[0]], axis=0))), LONGEST)
         share = float((1.0 / weights).sum())
-        totals = [np.einsum("k,kij->ij", weights, len(kind) * sum(squares[n] for n in kind)) for kind in kinds]
+        totals = [np.einsum("k,kij->ij", weights, len(kind) * np.sum([squares[n] for n in kind], axis=0)) for kind in kinds]
         tops = [float(np.linalg.eigvalsh(one)[-1]) * share for one in totals]
         chosen.append([int(m) for m in weights])
         gains.append([float.hex(top**0.5 * MORE) for top in tops])

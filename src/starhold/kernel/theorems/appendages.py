@@ -46,7 +46,7 @@ def points_with_appendages(claim: Claim) -> Proof:
     limits = [numbers.get(name) for name in ("limit", "limit.norm")]
     begun_with = [numbers[f"begun.{k}"] for k in range(motion.count)]
     begun, samples, V = motion.begun(ellipsoid, begun_with), 0, loop.lyapunov.at({"q0": 1 - var("v")})
-    times, turned, state = list[Fraction](), list[Fraction](), Column()
+    times, turned, ends = list[Fraction](), list[Fraction](), list[tuple[Period, Box, Column]]()
     rounds = read_list(claim.evidence["rounds"])
     demand(0 < len(rounds) <= ROUNDS, "there is no round, or too many are")
     for k, one in enumerate(rounds):
@@ -74,11 +74,12 @@ def points_with_appendages(claim: Claim) -> Proof:
         ):
             if limit is not None:
                 yield f"{name} {k}", Exceeds(limit, size)
+        ends.append((period, box, radii))
         begun, samples = later, samples + periods
-    wide, most_turned = norm(state[:3]), norm(state[3:6])
+    wide, most_turned = norm(ends[-1][1].state[:3]), norm(ends[-1][1].state[3:6])
     if (told := claim.evidence.get("response")) is not None:
         response = yield from responds(motion, *read_table(told, "weights", "gains"))
-        wide, most_turned = settled(motion, response, period, box, radii)
+        wide, most_turned = settled(motion, response, *ends[-1])
         samples += response.count
         times.append(motion.h * samples)
         turned.append(most_turned)

@@ -113,7 +113,8 @@ def summed(
         for place, (kind, gain) in enumerate(zip(kinds, gained, strict=True)):
             demand(gain > 6 * off, "a gain is too small")
             # (|a| + |b|)^2 <= 2 (|a|^2 + |b|^2)
-            weighted = [[len(kind) * share * x for x in row] for row in reduce(plus, [totals[n] for n in kind])]
+            both = [list(map(sum, zip(*rows, strict=True))) for rows in zip(*(totals[n] for n in kind), strict=True)]
+            weighted = [[len(kind) * share * x for x in row] for row in both]
             yield f"response of the {name} {place}", Definite(plus(scalar((gain - 6 * off) ** 2), weighted, -1))
     left, made = ([[abs(Fraction(x, 1 << PLACES)) + off for x in row] for row in part] for part in (rows, sizes))
     return Response(count, most, left, made)
