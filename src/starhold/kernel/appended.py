@@ -235,18 +235,18 @@ class Appended:
         """Return how far what is left of the series may take each component of a state in a period."""
         return self.tail * max(combined(image(sizes_of(self.A), box.state), image(sizes_of(self.B), box.torque)))
 
-    def beside(self, period: Period, box: Box, held: Fraction) -> Column:
+    def beside(self, period: Period, box: Box, wrong: Fraction) -> Column:
         """Return what a period at most adds to what `sampled` makes of samples, and `ways` of torques from outside and of
-        torques `held` in error."""
-        rounded = added([*box.state, 9 * period.outside, 3 * held]) / 2**PLACES
+        torques that are held, of up to `wrong`."""
+        rounded = added([*box.state, 9 * period.outside, 3 * wrong]) / 2**PLACES
         shaken = [period.outside * x + self.unseries(box) + rounded for x in self.bent]
         return combined(image(self.carry, period.over), shaken)
 
-    def hurried(self, period: Period, box: Box, radii: Column, held: Fraction) -> Fraction:
+    def hurried(self, period: Period, box: Box, radii: Column, wrong: Fraction) -> Fraction:
         """Return a bound of how far w' is at all times from what is linear in the last sample."""
-        moved = combined(image(self.given, [held] * 3), image(self.carry, period.over))
+        moved = combined(image(self.given, [wrong] * 3), image(self.carry, period.over))
         moved = [x + period.outside * y + self.unseries(box) for x, y in zip(moved, self.nudged, strict=True)]
-        torques = [(held + period.outside) * norm(row) for row in self.B[:3]]
+        torques = [(wrong + period.outside) * norm(row) for row in self.B[:3]]
         return norm(combined(image(self.hurry, radii), image(sizes_of(self.A[:3]), moved), torques, period.over[:3]))
 
 

@@ -139,8 +139,8 @@ class Swinging:
         (gone,) = np.nonzero((sizes < LEFT * sizes.max(axis=0)).all(axis=1))
         if not len(gone):
             return None
-        told = weighed(rows[: gone[0]], PARTS, ways, KINDS)
-        return told, concluded(responds(self.motion, *told.values()))
+        evidence = weighed(rows[: gone[0]], PARTS, ways, KINDS)
+        return evidence, concluded(responds(self.motion, *evidence.values()))
 
     def end(self, one: Round, period: Period) -> tuple[Fraction, Fraction, int]:
         """Return bounds of |w| and |q| from so many samples of the last round on."""

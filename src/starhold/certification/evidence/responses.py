@@ -36,10 +36,10 @@ def find_response(motion: Held) -> dict[str, Any] | None:
 
 def powers(rows: Array, A: Array, count: int) -> Array:
     """Return rows times so many powers of a matrix."""
-    found = [rows]
+    steps = [rows]
     for _ in range(count - 1):
-        found.append(found[-1] @ A)
-    return np.array(found)
+        steps.append(steps[-1] @ A)
+    return np.array(steps)
 
 
 def weighed(

@@ -77,8 +77,8 @@ def points_with_appendages(claim: Claim) -> Proof:
         ends.append((period, box, radii))
         begun, samples = later, samples + periods
     wide, most_turned = norm(ends[-1][1].state[:3]), norm(ends[-1][1].state[3:6])
-    if (told := claim.evidence.get("response")) is not None:
-        response = yield from responds(motion, *read_table(told, "weights", "gains"))
+    if (sums := claim.evidence.get("response")) is not None:
+        response = yield from responds(motion, *read_table(sums, "weights", "gains"))
         wide, most_turned = settled(motion, response, *ends[-1])
         samples += response.count
         times.append(motion.h * samples)
@@ -112,15 +112,15 @@ def responds(motion: Appended, weights: object, gains: object) -> Part[Response]
 
 def settled(motion: Appended, response: Response, period: Period, box: Box, radii: Column) -> tuple[Fraction, Fraction]:
     """Return bounds of |w| and |q| at all times from so many samples in a box on."""
-    held = period.error + norm(combined(image(period.law, radii), period.law_rest))
-    rest, pushes = motion.beside(period, box, held), (period.outside, period.outside, held)
+    wrong = period.error + norm(combined(image(period.law, radii), period.law_rest))
+    rest, pushes = motion.beside(period, box, wrong), (period.outside, period.outside, wrong)
     wide, turned, pulled = (
         added([gain * b for gain, b in zip(gains, pushes, strict=True)])
         + norm(combined(reach(response.beside[part], rest), reach(response.left[part], box.state)))
         for gains, part in zip(response.gains, PARTS.values(), strict=True)
     )
     # Each time is at most h/2 from a sample, and |q''| <= |w'|/2 + |w|^2 |q|/4.
-    h, hurried = motion.h, pulled + motion.hurried(period, box, radii, held)
+    h, hurried = motion.h, pulled + motion.hurried(period, box, radii, wrong)
     bent = hurried + norm(box.state[:3]) ** 2 * norm(box.state[3:6]) / 2
     return wide + h / 2 * hurried, turned + h * h / 16 * bent
 
