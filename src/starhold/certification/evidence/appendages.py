@@ -24,7 +24,7 @@ from starhold.certification.subject import above
 from starhold.certification.unmodelled import pushes
 from starhold.kernel.appended import Appended, Box, Column, Period, after, combined, follow, image
 from starhold.kernel.loops import TOLD_TORQUE, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, norm
+from starhold.kernel.numbers import WORK, RefusedError, norm
 from starhold.kernel.polynomials import most, var
 from starhold.kernel.theorems.appendages import FOLLOWED, KINDS, inner, responds, settled, sized
 from starhold.kernel.theorems.response import MOST, PARTS, Response
@@ -41,9 +41,10 @@ MORE, MARGIN, ROOM, TRIES, DIGITS = 1.0 + 1e-9, 1.001, 1.01, 30, 26
 """The margins of numbers, of bounds and of boxes; how often a box is widened; binary digits of modal coordinates."""
 FIRST = (1, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
 """The periods of the first rounds."""
-MOST_ROUNDS, NEARER, SHRUNK, STILL, LONGEST, LEFT = 24, 0.95, 0.25, 0.98, 2**22, 1e-3
+MOST_ROUNDS, NEARER, SHRUNK, STILL, LONGEST, LEFT, SHARE = 24, 0.95, 0.25, 0.98, 2**22, 1e-3, 27
 """The most rounds, how much nearer each later one is to lead, the share of bounds that is to be left before it, what of that
-share is hardly less, the most periods until then, and the share of a response that is left as it ends."""
+share is hardly less, the most periods until then, the share of a response that is left as it ends,
+and the work of a check by that of its samples for n states, n (n + 12), where these take a third of it."""
 Found: TypeAlias = "tuple[dict[str, Any], list[Round], Column, Period]"
 """The numbers of a start, rounds, bounds of samples as the last begins, and its period."""
 
@@ -134,7 +135,9 @@ class Swinging:
     def response(self) -> tuple[dict[str, Any], Response] | None:
         """Return the evidence about the response, and what it shows; None if it lasts too long."""
         A, ways = floats(self.motion.sampled), list(map(floats, self.motion.ways))
-        rows = powers(np.vstack([np.eye(self.motion.n)[:6], floats(self.motion.pull)]), A, MOST)
+        # So that the whole claim is checked within the work that it may take.
+        most = min(MOST, WORK // (SHARE * self.motion.n * (self.motion.n + 12)))
+        rows = powers(np.vstack([np.eye(self.motion.n)[:6], floats(self.motion.pull)]), A, most)
         sizes = np.abs(rows[:, :6]).max(axis=2)
         (gone,) = np.nonzero((sizes < LEFT * sizes.max(axis=0)).all(axis=1))
         if not len(gone):
