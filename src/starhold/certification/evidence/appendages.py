@@ -44,7 +44,7 @@ FIRST = (1, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
 MOST_ROUNDS, NEARER, SHRUNK, STILL, LONGEST, LEFT, SHARE = 24, 0.95, 0.25, 0.98, 2**22, 1e-3, 27
 """The most rounds, how much nearer each later one is to lead, the share of bounds that is to be left before it, what of that
 share is hardly less, the most periods until then, the share of a response that is left as it ends,
-and the work of a check by that of its samples for n states, n (n + 12), where these take a third of it."""
+and the work of a check by that of its samples for n states, n (n + 12), where these take a fifth of it."""
 Found: TypeAlias = "tuple[dict[str, Any], list[Round], Column, Period]"
 """The numbers of a start, rounds, bounds of samples as the last begins, and its period."""
 

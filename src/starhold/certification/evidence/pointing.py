@@ -30,7 +30,7 @@ from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand, plus, times, transpose
 from starhold.kernel.plans import Plan
-from starhold.kernel.regions import AT_REST, TURN, Tube, balls, widened
+from starhold.kernel.regions import TURN, Tube, balls
 from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread
 from starhold.kernel.theorems.response import first_of, responds
@@ -143,7 +143,7 @@ class Chain:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
         angle, fastest = ends(self.motion, tube, tube.region.X)
         heed, corners = HEED, self.motion.corners()
-        away = self.motion.away
+        away, entered = self.motion.away, self.motion.entered(tube)
         for _ in range(ELLIPSOIDS):
             within, more = forgotten(self.motion, tube)
             pushes = self.motion.linear(within)
@@ -156,7 +156,7 @@ class Chain:
             added = spread(a, pushes)
             moved = (plus(added, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
             rate = max(highest_ratio(after, X) for after in moved)
-            reach = highest_ratio(widened(within.region.X, away), X)
+            reach = highest_ratio(entered, X)
             inner = self.motion.tube(within.region.within(X, away))
             end = ends(self.motion, inner, X, away)
             if rate >= 1.0 or end[0] > angle * 0.99:
@@ -176,13 +176,14 @@ class Chain:
             room = 1 - sum(a)
             fall = 1 - Fraction(rate) * room
             self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
-            tube, (angle, fastest) = inner, end
+            tube, entered, (angle, fastest) = inner, X, end
         return angle, fastest
 
     def nearest(self) -> tuple[Chain, tuple[float, float]]:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
         (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
         tube, _ = on_level(self.motion, Fraction(self.levels[-1]["end"]))
+        self.motion.nears(tube)
         one = replace(self, ellipsoids=list[Any]())
         ends = [(one, one.respond(tube))]
         if not one.response or self.motion.loop.wheels:
@@ -273,8 +274,7 @@ class Pushed:
         if loop.plan is not None:
             planned, about = told_of(loop, loop.plan)
             more, self.evidence = more | planned, self.evidence | about
-        wide, turned, *apart = map(Fraction, self.evidence.get("swayed", ("0", "0")))
-        self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
+        self.radii = [*map(Fraction, self.evidence.get("swayed", ()))]
         changes = change_of_modelled(loop.loop, loop.known.envelope(noisy)) if OUTSIDE in words else (inf,)
         self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
@@ -293,7 +293,8 @@ class Pushed:
         wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
         motion = Held(wired, self.plan)
         self.plan = motion.plan
-        motion.swayed, motion.apart = self.swayed, self.apart
+        if self.radii:
+            motion.sways(self.radii)
         motion.late = weighed(motion, self.scales)
         return V, motion
 

@@ -30,7 +30,7 @@ def find_response(motion: Held) -> dict[str, Any] | None:
     if radius >= 1.0 or -SHORTEST / log(radius) > MOST:
         return None
     count = min(ceil(-LEFT / log(radius)), MOST)
-    rows = powers(np.vstack([np.eye(6), floats(motion.near.rates)]), A, count)
+    rows = powers(np.vstack([np.eye(6), floats(motion.near.rates)]) @ np.eye(6, len(A)), A, count)
     return {"rounds": 1} | weighed(rows, PARTS, list(map(floats, motion.ways)), KINDS)
 
 

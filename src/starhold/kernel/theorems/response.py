@@ -54,6 +54,7 @@ class Response:
         first, last, turn = (b for _, b in motion.linear(tube, begun[0], pulled))
         pushes = first, max(last - first, Fraction(0)), turn
         sizes = [min(region_sizes[name] + away[i // 3], begun[i // 3]) for i, name in enumerate(STATE)]
+        sizes += [motion.applied] * (len(motion.near.A) - len(STATE))
         wide, turned, pulled = (
             up(sum((gain * b for gain, b in zip(gains, pushes, strict=True)), norm(reach(self.left[part], sizes))))
             for gains, part in zip(self.gains, PARTS.values(), strict=True)
@@ -70,7 +71,8 @@ def first_of(motion: Held, tube: Tube) -> tuple[Radii, Fraction]:
 
 def responds(motion: Held, weights: Any, gains: Any) -> Part[Response]:
     """The gains are no less than those of the loop, of its rates, its turn and the acceleration that is linear in both."""
-    rows = scalar(1, 6) + motion.near.rates
+    # What C_0 is of (w, q): the torque that acts late is in none of them.
+    rows = [row + [Fraction(0)] * (len(motion.near.A) - len(STATE)) for row in scalar(1, 6) + motion.near.rates]
     return summed(rows, PARTS, motion.near.A, motion.ways, KINDS, weights, gains)
 
 
@@ -96,7 +98,7 @@ def summed(
     sums = [[[[0] * 3 for _ in range(3)] for _ in ways] for _ in weighed]
     sizes = [[0] * len(A) for _ in rows]
     for k in range(count):
-        Account.spend(len(rows) * len(A) * (len(A) + len(B)) // 5, 3 * PLACES)
+        Account.spend(len(rows) * len(A) * (len(A) + len(B)) // 8, 3 * PLACES)
         sizes = [[x + abs(y) for x, y in zip(*pair, strict=True)] for pair in zip(sizes, rows, strict=True)]
         steps = carried(rows, B, under)
         for part, chosen, totals in zip(parts.values(), weighed, sums, strict=True):
