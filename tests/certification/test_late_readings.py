@@ -29,6 +29,7 @@ from starhold.studies.bodies.rigid_body import certified_loops, wanted_of
 from tests.certification.attack import Attack, flown
 from tests.certification.extremal import Steered
 from tests.kernel.flights import along
+from tests.tiers import leading
 
 OWN = """
 name = "own"
@@ -95,7 +96,7 @@ def claim_of(parts):
     return certify(loop, "own", replace(wanted_of(scenario, True), alone=True)).claim("pointing")
 
 
-@pytest.mark.parametrize("parts", PARTS)
+@pytest.mark.parametrize("parts", leading(PARTS))
 def test_an_own_spacecraft_has_a_claim_with_all_of_its_sensors(parts):
     (_, loop), claim = loop_with(parts), claim_of(parts)
     assert (claim.outcome, claim.left_out) == ("proved", [])
@@ -113,7 +114,7 @@ def test_an_own_spacecraft_has_a_claim_with_all_of_its_sensors(parts):
     assert worst.rate < 1.0
 
 
-@pytest.mark.parametrize("parts", PARTS)
+@pytest.mark.parametrize("parts", leading(PARTS))
 def test_a_claim_with_less_than_its_parts_say_is_of_another_loop(parts):
     (_, loop), claim = loop_with(parts), claim_of(parts).proof.claim
     assert not differences(claim, loop)
@@ -216,7 +217,7 @@ def test_errors_of_the_complementary_filter_follow_its_recursion():
     assert complementary_filter.recursion(params._replace(bias_gain=0.0), noise, period, tuple(rate)) is None
 
 
-@pytest.mark.parametrize("reading", ["gyro", "tracker", "acceleration"])
+@pytest.mark.parametrize("reading", leading(["gyro", "tracker", "acceleration"]))
 def test_the_filter_that_flies_comes_as_far_as_its_bound_says_and_no_further(reading):
     """Each reading is off by as much as it may, with the signs of the response."""
     period, every, small = 0.25, 2, 1e-7

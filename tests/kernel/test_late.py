@@ -63,6 +63,7 @@ def test_an_actuator_that_lags_is_in_the_claim_and_no_flight_breaks_it(late):
     assert max(shares) > 0.1
 
 
+@pytest.mark.slow
 def test_one_file_with_an_actuator_that_says_how_late_it_is_is_in_the_claim_checked_and_flown(tmp_path):
     (tmp_path / "drive.py").write_text(FILES["drive.py"])
     text = BODY + "substeps = 8\n" + part('file = "drive.py"\nbandwidth = "2 Hz"\n') + PD
