@@ -14,6 +14,7 @@ from starhold.certification.evidence.finding import certificate
 from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes
+from starhold.errors import InputError
 from starhold.kernel.check import check
 from starhold.scenario.building import build
 from starhold.simulation.lane import fly, label
@@ -137,3 +138,14 @@ def test_the_other_quaternion_is_outside_the_set_of_an_odd_law_with_an_even_v(tm
             # It comes from there, and is covered once it is in the set.
             assert angles[round(begin / loop.period) :].max() < claim.numbers["funnel"][0][1]
             assert run.arrays["attitude_error"][round(begin / loop.period), 0] > 0.0
+
+
+def test_a_law_is_not_even_because_its_card_says_so(tmp_path, monkeypatch):
+    """Its claim would hold at the other quaternion too, from which it turns the body by a full turn."""
+    monkeypatch.setitem(globals(), "LAW", LAW.replace('claims="none"', 'claims="none", quaternion_sign="even"'))
+    with pytest.raises(InputError, match="its torque at q differs from that at -q, but its card says: even"):
+        loop_of(tmp_path, NONE, EVEN)
+    # One that is.
+    by = "scale(measurement.attitude[0], vector_part(measurement.attitude))"
+    monkeypatch.setitem(globals(), "LAW", LAW.replace("vector_part(measurement.attitude))", f"{by})", 1))
+    assert loop_of(tmp_path, NONE, EVEN).law.card.quaternion_sign == "even"
