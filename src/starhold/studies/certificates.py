@@ -84,7 +84,7 @@ def left_open(path: Path, scenario: Scenario) -> list[str]:
         for before, claim in zip(plain, every, strict=True):
             about = [*texts(claim.assumptions[len(before.assumptions) :]), *span.unmet_throughout(before)]
             about += [] if inside.get(claim.kind, True) else ["the flight starts outside of its set"]
-            said.setdefault("; ".join(about), []).append(claim.kind)
+            said.setdefault("; ".join(dict.fromkeys(about)), []).append(claim.kind)
         left += [f"{one.name}: {', '.join(kinds)}: {text}" for text, kinds in said.items() if text]
     return left
 
