@@ -49,6 +49,58 @@ def lyapunov(measurement, gains, craft):
 def examples():
     return [Gains(0.5, 0.05)]
 """
+BALLAST = """
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.vector import ZERO, add, cross, scale
+from starhold.parts.contract import Card, Parameter, Push
+
+CARD = Card(title="Ballast", summary="more inertia, or momentum", sources=("a textbook",), assumptions=("none",))
+ROLE, ACTS = "effector", {acts}
+
+
+class Params(NamedTuple):
+    inertia: Annotated[float, Parameter("kg m^2", text="that it adds")] = 0.0
+    momentum: Annotated[float, Parameter("N m s", text="that it has")] = 0.0
+
+
+def command(applied, params):
+    return applied
+
+
+def reaction(state, command, body, params):
+    held = scale(-1.0, cross(body.rate, momentum(state, params)))
+    return add(command, held) if ACTS else held
+
+
+def rates(state, command, body, acceleration, params):
+    return None
+
+
+def momentum(state, params):
+    return (params.momentum, 0.0, 0.0)
+
+
+def applied(state, command, body, params):
+    return command
+
+
+def bound(params, envelope):
+    return Push(1e-9, abs(params.momentum))
+
+
+def error(params, envelope):
+    return Push(0.0)
+
+
+def examples():
+    return [Params()]
+"""
+ADDED = """
+
+def inertia(state, params):
+    return ((params.inertia, 0.0, 0.0), (0.0, params.inertia, 0.0), (0.0, 0.0, params.inertia))
+"""
 ALL, ONE, NONE = "scale(3000.0, e)", "(0.0, 3000.0 * e[1], 0.0)", "(0.0, 0.0, 0.0)"
 WELL, EVEN = "2.0 * gains.k * (1.0 - measurement.attitude[0])", "gains.k * dot(q, q)"
 PULLED = {"orbit": {"altitude": "400 km", "inclination": "50 deg"}, "environment": {"gravity_gradient": True}}
@@ -149,3 +201,30 @@ def test_a_law_is_not_even_because_its_card_says_so(tmp_path, monkeypatch):
     by = "scale(measurement.attitude[0], vector_part(measurement.attitude))"
     monkeypatch.setitem(globals(), "LAW", LAW.replace("vector_part(measurement.attitude))", f"{by})", 1))
     assert loop_of(tmp_path, NONE, EVEN).law.card.quaternion_sign == "even"
+
+
+@pytest.mark.parametrize(
+    ("added", "told", "numbers", "there"),
+    [
+        (ADDED, NONE, {"inertia": 60.0}, False),
+        ("", "scale(0.5, measurement.wheel_momentum)", {"momentum": 0.01}, False),
+        # A law that does not read it, and momentum that is none.
+        ("", NONE, {"momentum": 1e-4}, True),
+        ("", "scale(0.5, measurement.wheel_momentum)", {}, True),
+    ],
+)
+def test_no_bound_of_a_torque_is_one_of_inertia_or_of_momentum_that_a_law_reads(added, told, numbers, there, tmp_path):
+    """The largest torque of an effector says neither; a flight that was covered by the claim broke it by far."""
+    (tmp_path / "ballast.py").write_text(BALLAST.replace("{acts}", str(not added)) + added)
+    part = {"file": str(tmp_path / "ballast.py")} | numbers
+    attitude = [float(np.cos(0.05)), 0.0, float(np.sin(0.05)), 0.0]
+    here = {"target": {"mode": "inertial", "attitude": [1, 0, 0, 0]}}
+    loop = loop_of(tmp_path, told, attitude=attitude, part=[part], **here)
+    issued = certify(loop, "", Wanted(pointing=True, alone=True))
+    claim = issued.claim("pointing")
+    assert claim.outcome == "proved"
+    run, angles = flown(loop, 6000)
+    (time, most), *_ = ((x, y) for x, y in claim.numbers["funnel"] if x > 300.0)
+    kept = angles[round(time / loop.period) :].max() <= most
+    assert (claim.left_out, kept) == (([], True) if there else (["effector ballast"], False))
+    assert (covered(issued, loop, run) is not None) is there

@@ -1,4 +1,5 @@
-"""The appendages of a loop, whose motion is a program of the kernel: of the equations that fly, with all their numbers."""
+"""The appendages of a loop, whose motion is a program of the kernel: of the equations that fly, with all their numbers; and
+whether laws are told of what effectors store."""
 
 from __future__ import annotations
 
@@ -7,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from starhold.algebra.operations import UnreadableError
 from starhold.algebra.structure import leaves, mapped
 from starhold.algebra.vector import ZERO
+from starhold.errors import InputError
+from starhold.laws.program import law_program
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
 from starhold.parts.part import Fitted
@@ -16,6 +20,8 @@ from starhold.trace.straight_line import straight_line
 
 TAKING = ("command", "switch", "pulse", "push", "bound")
 """Equations of effectors that are no appendages: they take commands, move the orbit, or have a bound of their own."""
+TOLD_MOMENTUM = "measurement.wheel_momentum."
+"""How the inputs of a law's program begin that are what effectors tell it of their momentum."""
 
 
 def appendages(loop: ClosedLoop) -> tuple[Fitted, ...]:
@@ -67,6 +73,20 @@ def recorded_states(loop: ClosedLoop, arrays: Mapping[str, Any]) -> Any:
             return None
         columns += [arrays[name] for name in names]
     return np.hstack([np.atleast_2d(x.T).T for x in columns])
+
+
+def tells_momentum(loop: ClosedLoop, fitted: Fitted) -> bool:
+    """Return whether a law reads the momentum that effectors have, and this one may have some."""
+    measured: Any = fitted.part.hook("measured_momentum") or fitted.part.module.momentum
+    params = fitted.prepared(loop.period)
+    state = fitted.remembered(params)
+    stored = straight_line(lambda state: measured(state, params), state=state)
+    try:
+        law = law_program(loop.law, loop.gains, loop.known, loop.period, loop.remembers)
+    except (InputError, UnreadableError):
+        return True
+    reads = any(name.startswith(TOLD_MOMENTUM) for name in law["inputs"])
+    return reads and (bool(stored["inputs"]) or any(measured(state, params)))
 
 
 def _alone(loop: ClosedLoop) -> ClosedLoop:

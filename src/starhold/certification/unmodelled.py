@@ -12,7 +12,7 @@ import numpy as np
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import Vector, apply, norm, scale
-from starhold.certification.appendages import appendages
+from starhold.certification.appendages import appendages, tells_momentum
 from starhold.certification.certificate import LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
 from starhold.certification.orbit_band import band_of, extremes, movers
 from starhold.certification.target_motion import motion_of
@@ -266,19 +266,25 @@ def _is_modelled(part: Part) -> bool:
 def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, estimated: bool) -> bool:
     """Whether all that a part does to a loop has a bound. estimated: an estimator takes its errors out."""
     part, banded = fitted.part, fitted in movers(loop) and bool(band_of(loop).share)
-    always = part.hook("acceleration") is not None and not hasattr(fitted.params, "moves_orbit")
-    if moves(fitted.params) or (always and not banded):
+    if moves(fitted.params) or (_always_moves(fitted) and not banded):
         # No claim follows an orbit that such a force changes.
         return False
     if banded and not part.hook("torque"):
         return True
     torque, error = (push is not None for push in _pushes(fitted, envelope))
     if part.role == "effector":
-        # Beside the command an effector reacts as its momentum turns with the body.
-        return torque and (error or not part.flag("ACTS"))
+        # Beside the command an effector reacts as its momentum turns with the body. No bound is one of its inertia, or of
+        # what a law makes of its momentum.
+        bounded = torque and part.hook("inertia") is None
+        return bounded and (not part.flag("ACTS") or (error and not tells_momentum(loop, fitted)))
     if _is_idle(loop, fitted, envelope) or torque or error:
         return True
     return not estimated and _bounded(fitted) is not None and not _is_random(_noise(fitted, loop.period))
+
+
+def _always_moves(fitted: Fitted) -> bool:
+    """Return whether a part moves the orbit, whatever its parameters are."""
+    return fitted.part.hook("acceleration") is not None and not hasattr(fitted.params, "moves_orbit")
 
 
 def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool:
@@ -288,7 +294,8 @@ def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool
     if part.role == "sensor" and "magnetic_field" in _shown(fitted):
         return _bounded(fitted) == NO_ERRORS and not _is_random(_noise(fitted, period))
     if part.role == "environment":
-        return _is_modelled(part) or (_pushes(fitted, envelope)[0] is not None and not moves(fitted.params))
+        still = not moves(fitted.params) and not _always_moves(fitted)
+        return _is_modelled(part) or (_pushes(fitted, envelope)[0] is not None and still)
     return part.role in ("sensor", "estimator", "target") or part.name in ("magnetorquers", "inactive-wheels")
 
 
