@@ -101,6 +101,32 @@ ADDED = """
 def inertia(state, params):
     return ((params.inertia, 0.0, 0.0), (0.0, params.inertia, 0.0), (0.0, 0.0, params.inertia))
 """
+PLACE = """
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.vector import Vector, scale
+from starhold.parts.contract import NO_ERRORS, Card, NoParams
+
+CARD = Card(title="Place", summary="a place", sources=("a textbook",), assumptions=("none",))
+ROLE, Params = "sensor", NoParams
+
+
+class Reading(NamedTuple):
+    position: Annotated[Vector, Quantity("m", "position as it is told", "axis")]
+
+
+def measure(state, memory, params, dice, step):
+    return Reading(scale(0.4, state.position)), memory
+
+
+def error(params):
+    return NO_ERRORS
+
+
+def examples():
+    return [Params()]
+"""
 ALL, ONE, NONE = "scale(3000.0, e)", "(0.0, 3000.0 * e[1], 0.0)", "(0.0, 0.0, 0.0)"
 WELL, EVEN = "2.0 * gains.k * (1.0 - measurement.attitude[0])", "gains.k * dot(q, q)"
 PULLED = {"orbit": {"altitude": "400 km", "inclination": "50 deg"}, "environment": {"gravity_gradient": True}}
@@ -228,3 +254,15 @@ def test_no_bound_of_a_torque_is_one_of_inertia_or_of_momentum_that_a_law_reads(
     kept = angles[round(time / loop.period) :].max() <= most
     assert (claim.left_out, kept) == (([], True) if there else (["effector ballast"], False))
     assert (covered(issued, loop, run) is not None) is there
+
+
+def test_errors_of_an_attitude_are_none_of_a_place_at_which_a_torque_is_told(tmp_path):
+    """A sensor that says how wrongly it tells attitude and rate at most, which is not at all, tells a place far too low."""
+    (tmp_path / "place.py").write_text(PLACE)
+    loop = loop_of(tmp_path, "scale(-1.0, e)", part=[{"file": str(tmp_path / "place.py")}], **PULLED)
+    issued = certify(loop, "", Wanted(pointing=True, alone=True))
+    claim = issued.claim("pointing")
+    assert (claim.outcome, claim.left_out) == ("proved", ["sensor place"])
+    assert covered(issued, *(loop, flown(loop, 3)[0])) is None
+    _, angles = flown(loop, 12000)
+    assert angles[11000:].max() > 1.2 * claim.numbers["angle"]

@@ -36,6 +36,8 @@ DETUMBLING = "detumbling"
 """The kind of claims about a law that opposes the change of the magnetic field."""
 SPAN = 3600.0
 """The time (s) covered by a claim with a share where there is no orbit."""
+PLACED = frozenset(("position", "velocity"))
+"""What a part may tell that has no bound of its errors."""
 TELLING, COMMANDED = ("sensor", "estimator"), ("actuator", "effector")
 """Roles whose `error` affects the law's measurements, and its command."""
 MORE, LARGER = 1.0 + 1e-12, 1.0 + 1e-6
@@ -137,8 +139,8 @@ def change_of_modelled(loop: ClosedLoop, envelope: Envelope) -> Push:
     for a part that does not say, or if a position is told that could be off."""
     parts = [f for f in loop.used("environment") if f.part.flag("MODELLED")]
     tells: list[Any] = [f.part.hook("torque_change") for f in parts]
-    telling = [*(_shown(f) for f in loop.used("sensor")), *(f.part.module.Estimate._fields for f in loop.used("estimator"))]
-    if None in tells or any("position" in names for names in telling):
+    telling = (*loop.used("sensor"), *loop.used("estimator"))
+    if None in tells or not all(PLACED.isdisjoint(_tells(f)) for f in telling):
         return Push(inf, inf)
     declared = [Push(0.0), *(tell(f.params, loop.craft, envelope) for tell, f in zip(tells, parts, strict=True))]
     return Push(*(sum(x) * MORE for x in zip(*declared, strict=True)))
@@ -319,8 +321,9 @@ def _estimated(loop: ClosedLoop, driven: Driven | None) -> Collection[Fitted]:
 
 
 def _bounded(fitted: Fitted) -> Errors | None:
-    """Read the declared largest errors of a part besides its noise, where they are finite."""
-    tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING else None
+    """Read the declared largest errors of a part besides its noise, where they are finite; none are those of a place."""
+    part = fitted.part
+    tell: Any = part.hook("error") if part.role in TELLING and PLACED.isdisjoint(_tells(fitted)) else None
     largest = NO_ERRORS if tell is None else tell(fitted.params)
     return None if tell is None or not all(map(isfinite, largest)) else largest
 
@@ -377,6 +380,11 @@ def _rate(loop: ClosedLoop) -> Vector:
 def _shown(sensor: Fitted) -> set[str]:
     """Return the names of a sensor's readings."""
     return set(sensor.part.module.Reading._fields)
+
+
+def _tells(fitted: Fitted) -> set[str]:
+    """Return the names of what a sensor or an estimator tells."""
+    return _shown(fitted) if fitted.part.role == "sensor" else set(fitted.part.module.Estimate._fields)
 
 
 def _is_idle(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
