@@ -20,7 +20,6 @@ from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import (
-    LARGER,
     Pushes,
     change_of_modelled,
     driven_errors,
@@ -161,9 +160,9 @@ def _late(numbers: Mapping[Any, Fraction], late: Late | None) -> Iterator[str]:
     if late is None:
         yield "its torque is not late"
         return
-    for name, x in (("kept", late.kept), ("mean", late.mean)):
+    for k, (name, x) in enumerate((("kept", late.kept), ("mean", late.mean))):
         least = stated.get(f"{name}.least")
-        off = least is not None and (not late.alike or least > fraction(x / LARGER))
+        off = least is not None and (not late.alike or least > fraction(late.least[k]))
         if off or stated.get(name, 0) < fraction(x):
             yield "its torque is late otherwise"
     if isfinite(late.most) and ("most" not in stated or stated["most"] > fraction(late.most)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from math import ceil, hypot, inf, isfinite
+from math import ceil, exp, hypot, inf, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,7 +41,7 @@ PLACED = frozenset(("position", "velocity"))
 TELLING, COMMANDED = ("sensor", "estimator"), ("actuator", "effector")
 """Roles whose `error` affects the law's measurements, and its command."""
 MORE, LARGER = 1.0 + 1e-12, 1.0 + 1e-6
-"""A margin for the floating-point sum, and one for how a flight follows a lag in steps of at most a tenth of it."""
+"""A margin for the floating-point sum, and one for numbers that other machines may round otherwise."""
 
 
 class Pushes(NamedTuple):
@@ -111,13 +111,25 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
 
 
 def late_torque(loop: ClosedLoop) -> Late | None:
-    """Return how late the torque is, with a margin for rounding; None where no actuator tells, or more than one is late."""
+    """Return how late the torque is, with a margin for rounding and for how flights follow a lag in their steps; None where
+    no actuator tells, or more than one is late."""
     actuators = _moving(loop)
     tell: Any = actuators[0].part.hook("late") if len(actuators) == 1 else None
     if tell is None:
         return None
     late: Late = tell(actuators[0].params, loop.period)
-    return late._replace(kept=late.kept * LARGER, mean=late.mean * LARGER, most=late.most / LARGER)
+    kept, mean = _followed(loop, actuators[0].fastest)
+    least = (late.kept / kept, late.mean / mean) if late.alike else ()
+    return late._replace(kept=late.kept * kept, mean=late.mean * mean, most=late.most / LARGER, least=least)
+
+
+def _followed(loop: ClosedLoop, fastest: float) -> tuple[float, float]:
+    """Return by which factors what a lag keeps of a difference in a control period, and the mean of that, may be off in
+    flights: the steps of the fourth-order method keep 1 - x + x^2/2 - x^3/6 + x^4/24 each, and more than exp(-x)."""
+    x = fastest * loop.period / loop.substeps
+    step, exact = 1.0 - x * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0))), exp(-x * loop.substeps)
+    kept = (step * exp(x)) ** loop.substeps
+    return kept * LARGER, (1.0 + (kept - 1.0) * exact / (1.0 - exact) if x else 1.0) * LARGER
 
 
 def _moving(loop: ClosedLoop) -> list[Fitted]:

@@ -150,12 +150,13 @@ class Late(NamedTuple):
     """How what a part gives is late, in a loop of one control period. Let e be the command less what acts. In a period |e|
     does not grow, is no more than `mean` times its first value in the mean, and `kept` times that in the end; then it
     changes by as much as the command. All this while no component of e exceeds `most`. alike: e keeps its direction, and
-    falls exactly so."""
+    falls exactly so; least: of both at least, where flights do not follow exactly so."""
 
     kept: float
     mean: float
     most: float = math.inf
     alike: bool = False
+    least: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ DIGITS, STARTS, BEYOND = 7, 500, 1.02
 """The digits of numbers; how many starts are tried, and the margin for others."""
 MARGINS = (1.05, 1.05, 1.05, 1.1)
 """By how much each bound of a part is larger than what follows from the one before."""
-LEAST = 1.0 - 4e-6
-"""How exactly it is known at least how late something is."""
+LEAST = 1.0 - 3e-6
+"""How exactly numbers are known that other machines may round otherwise."""
 WEIGHT = 0.9
 """The weight with which what is late costs V the least, where it does so by the product of two forms."""
 
@@ -35,7 +35,8 @@ def numbers_of(late: contract.Late | None) -> dict[str, float]:
         return {}
     numbers = {"kept": late.kept, "mean": late.mean, "most": late.most, "weight": 1.0, "begun": 0.0, "rest": 0.0}
     if late.alike:
-        numbers |= {"kept.least": late.kept * LEAST, "mean.least": late.mean * LEAST}
+        kept, mean = late.least
+        numbers |= {"kept.least": kept * LEAST, "mean.least": mean * LEAST}
     return {LATE + name: x for name, x in numbers.items() if isfinite(x)}
 
 
