@@ -4,6 +4,7 @@ whether laws are told of what effectors store."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -90,5 +91,6 @@ def tells_momentum(loop: ClosedLoop, fitted: Fitted) -> bool:
 
 
 def _alone(loop: ClosedLoop) -> ClosedLoop:
-    others = {f.part.name for f in loop.used("effector") if f not in appendages(loop)}
-    return loop.without("sensor", "estimator", "watcher", "environment", "actuator", *others)
+    moved, bare = appendages(loop), loop.without("sensor", "estimator", "watcher", "environment", "actuator")
+    # Not by their names, which parts of two files may share.
+    return replace(bare, parts=tuple(f for f in bare.parts if f.part.role != "effector" or f in moved))

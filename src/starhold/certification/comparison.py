@@ -66,7 +66,8 @@ def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]
 
 def _of_detumbling(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     try:
-        words, numbers = bounds_of(recorded.known)
+        # Torques that grow with the rate do so up to the largest one of the claim.
+        words, numbers = bounds_of(recorded.known, above(rational(claim["numbers"]["rate.0"])))
     except NotFoundError as reason:
         yield str(reason)
         return
