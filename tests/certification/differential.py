@@ -76,8 +76,8 @@ def _with(tables, path, value):
 
 
 def judged(path, name, claim, base, said, changed, tables):
-    """What is wrong with what is said of other tables with the certificate at a path, and how they were judged. said: what is
-    left open of the scenario that it was made for; claim: that of its law `name` as it flies."""
+    """What is wrong with what is said of other tables with the certificate at a path, and how they were judged. said: what
+    is left open of the scenario that it was made for; claim: that of its law `name` as it flies."""
     try:
         scenario = sh.scenario(tables)
         differing, entry = compare_programs(path, scenario), scenario.pick(name)

@@ -37,7 +37,8 @@ def run_through(tables, folder, count=None):
     said = left_open(path, scenario)
     every = list(others(tables))
     chosen = every if count is None else [every[k] for k in np.random.default_rng(7).permutation(len(every))[:count]]
-    for name, claim, loop in ((e.name, one.certificate.claim("pointing"), one.loop) for e, one in zip(scenario.laws, issued)):
+    for one in issued:
+        name, claim, loop = one.certificate.name, one.certificate.claim("pointing"), one.loop
         proved = claim if claim is not None and claim.outcome == "proved" else None
         for changed, other in chosen:
             fault, verdict = judged(path, name, proved, loop, said, changed, other)

@@ -285,9 +285,7 @@ def test_a_torque_that_grows_with_the_rate_is_compared_at_the_rates_of_the_claim
     (claim,) = tumbling()["claims"]
     slow = sh.load("cubesat-detumble").with_({"initial.rate": [0.01, 0.0, 0.0], "environment.gravity_gradient": False})
     loop, told = build(slow, slow.pick("b-dot")), float(Fraction(claim["numbers"]["outside"]))
-    rubbing = SimpleNamespace(
-        ROLE="environment", torque=lambda *_: ZERO, bound=lambda *_: Push(0.0, 0.5 * told / 0.01)
-    )
+    rubbing = SimpleNamespace(ROLE="environment", torque=lambda *_: ZERO, bound=lambda *_: Push(0.0, 0.5 * told / 0.01))
     rubs = loop.with_parts(Fitted(Part("rubbing", rubbing), NoParams()))
     assert differences(claim, loop) == []
     assert differences(claim, rubs) == ["outside is exceeded"]

@@ -30,8 +30,8 @@ class Tried(NamedTuple):
 
 
 class Flown(NamedTuple):
-    """A certificate of a checked file: its claims that have proofs, by their places, and the loop of this name of a scenario.
-    ends: where the previous mode hands over to it; begins: whether the scenario's flight begins with it."""
+    """A certificate of a checked file: its claims that have proofs, by their places, and the loop of a scenario that has its
+    name. ends: where the previous mode hands over to it; begins: whether the scenario's flight begins with it."""
 
     name: str
     places: list[int]
@@ -54,8 +54,8 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
 
 
 def left_open(path: Path, scenario: Scenario) -> list[str]:
-    """Return what the proofs of a checked file leave open about the loops of a scenario that they are about: parts and motions
-    that the claims leave out, assumptions that the loops do not meet, and starts outside of the claims' sets."""
+    """Return what the proofs of a checked file leave open about the loops of a scenario, from which they do not differ: what
+    the claims leave out or assume beside, assumptions that the loops do not meet, and starts outside of the claims' sets."""
     from starhold.analysis.departure import Span
     from starhold.certification.assumptions import texts
     from starhold.certification.certificate import Certificate
