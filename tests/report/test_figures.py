@@ -122,15 +122,6 @@ def test_figures_of_an_attitude_are_drawn_without_what_flies_reads_and_proves(tm
 
 
 @pytest.mark.slow
-def test_equal_flights_give_equal_files(tmp_path: Path) -> None:
-    folders = [tmp_path / "a", tmp_path / "b"]
-    for folder in folders:
-        folder.mkdir()
-    first, second = (draw(flown.flights(), folder, flown.scenario()) for folder in folders)
-    assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
-
-
-@pytest.mark.slow
 def test_odd_names_are_shown_as_they_stand(tmp_path: Path) -> None:
     first, second = flown.flights()
     odd = [flown.renamed(first, "_$\\frac{"), flown.renamed(second, "転 " + "long " * 30)]
