@@ -78,7 +78,9 @@ def recorded_states(loop: ClosedLoop, arrays: Mapping[str, Any]) -> Any:
 
 def tells_momentum(loop: ClosedLoop, fitted: Fitted) -> bool:
     """Return whether a law reads the momentum that effectors have, and this one may have some."""
-    measured: Any = fitted.part.hook("measured_momentum") or fitted.part.module.momentum
+    measured: Any = fitted.part.hook("measured_momentum") or fitted.part.hook("momentum")
+    if measured is None:
+        return False
     params = fitted.prepared(loop.period)
     state = fitted.remembered(params)
     stored = straight_line(lambda state: measured(state, params), state=state)
