@@ -18,16 +18,17 @@ from starhold.certification.evidence.starts import POINTS
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
+from starhold.certification.measured import driven_errors
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import (
+    GROWING,
     Pushes,
     change_of_modelled,
-    driven_errors,
     late_torque,
     noisy_fields,
     samples_of,
 )
-from starhold.kernel.follower import LATE
+from starhold.kernel.follower import KNOWN, LATE
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, TOLD_TORQUE, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
@@ -113,6 +114,8 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if claim["theorem"] in BOUNDED:
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
+        # Without what grows as the body moves its parts are left out by name.
+        known = replace(known, lags=not numbers.keys().isdisjoint(GROWING))
         pushed = known.against(envelope).numbers
         if "share" in numbers and (driven := driven_errors(loop)) is not None:
             pushed[DEVIATION] = driven.torque
@@ -161,10 +164,10 @@ def _late(numbers: Mapping[Any, Fraction], late: Late | None) -> Iterator[str]:
     if late is None:
         yield "its torque is not late"
         return
-    for k, (name, x) in enumerate((("kept", late.kept), ("mean", late.mean))):
-        least = stated.get(f"{name}.least")
-        off = least is not None and (not late.alike or least > fraction(late.least[k]))
-        if off or stated.get(name, 0) < fraction(x):
+    for k, name in enumerate(KNOWN):
+        x, least = getattr(late, name), stated.get(f"{name}.least")
+        off = least is not None and (late.moment is None or least > fraction(late.least[k]))
+        if off or (name in stated and stated[name] < fraction(x)):
             yield "its torque is late otherwise"
     if isfinite(late.most) and ("most" not in stated or stated["most"] > fraction(late.most)):
         yield "its torque is late otherwise where it is further off"

@@ -25,14 +25,14 @@ from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
 from starhold.certification.matrices import above, floats
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
+from starhold.certification.unmodelled import Pushes, change_of_modelled
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand, plus, times, transpose
 from starhold.kernel.plans import Plan
-from starhold.kernel.regions import AT_REST, TURN, Tube, balls, widened
+from starhold.kernel.regions import TURN, Tube, balls
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread
+from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
 from starhold.kernel.theorems.response import first_of, responds
 from starhold.parts.craft import tensor
 
@@ -91,19 +91,21 @@ class Chain:
         late = of_late(self.motion.late)
         if self.motion.plan is None:
             return {"level": self.level} | late
-        off = self.motion.planned(self.motion.region(Fraction(self.level)).sizes)
+        region = self.motion.region(Fraction(self.level))
+        off = self.motion.planned((self.motion.tube(region).region if self.motion.grows else region).sizes)
         return {"level": self.level} | late | {"plan.error": float(off) * MORE}
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
-        c = Fraction(self.level)
+        c, tube = Fraction(self.level), None
         while len(self.levels) < LEVELS and (lower := self.lower(c)) is not None:
             tau, beta, floor = lower
             end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
             if end > c * Fraction(9, 10):
                 break
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
-            self.samples += periods(self.motion.h * beta, floor, c, end) + on_level(self.motion, end)[1]
+            tube, more = on_level(self.motion, end, tube or self.motion.tube(self.motion.region(c)))
+            self.samples += periods(self.motion.h * beta, floor, c, end) + more
             c = end
         return float(c)
 
@@ -143,7 +145,7 @@ class Chain:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
         angle, fastest = ends(self.motion, tube, tube.region.X)
         heed, corners = HEED, self.motion.corners()
-        away = self.motion.away
+        away, entered = self.motion.away, self.motion.entered(tube)
         for _ in range(ELLIPSOIDS):
             within, more = forgotten(self.motion, tube)
             pushes = self.motion.linear(within)
@@ -156,8 +158,9 @@ class Chain:
             added = spread(a, pushes)
             moved = (plus(added, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
             rate = max(highest_ratio(after, X) for after in moved)
-            reach = highest_ratio(widened(within.region.X, away), X)
+            reach = highest_ratio(entered, X)
             inner = self.motion.tube(within.region.within(X, away))
+            more += waited(self.motion, within, inner)
             end = ends(self.motion, inner, X, away)
             if rate >= 1.0 or end[0] > angle * 0.99:
                 if not heed:
@@ -165,24 +168,19 @@ class Chain:
                 heed = 0.0
                 continue
             self.samples += more
-            self.ellipsoids.append(
-                {
-                    "shape": [[str(x) for x in row] for row in X],
-                    "shares": [str(x) for x in a],
-                    "rate": str(Fraction(rate)),
-                    "reach": str(Fraction(reach)),
-                }
-            )
+            one = {"shape": [[str(x) for x in row] for row in X], "shares": [str(x) for x in a]}
+            self.ellipsoids.append(one | {"rate": str(Fraction(rate)), "reach": str(Fraction(reach))})
             room = 1 - sum(a)
             fall = 1 - Fraction(rate) * room
             self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
-            tube, (angle, fastest) = inner, end
+            tube, entered, (angle, fastest) = inner, X, end
         return angle, fastest
 
     def nearest(self) -> tuple[Chain, tuple[float, float]]:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
         (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
         tube, _ = on_level(self.motion, Fraction(self.levels[-1]["end"]))
+        self.motion.nears(tube)
         one = replace(self, ellipsoids=list[Any]())
         ends = [(one, one.respond(tube))]
         if not one.response or self.motion.loop.wheels:
@@ -199,6 +197,7 @@ class Chain:
             try:
                 within, more = forgotten(motion, tube)
                 begun, pulled, inner = response.after(motion, within, begun, pulled)
+                more += waited(motion, within, inner)
             except RefusedError:
                 break
             end = ends(self.motion, inner, balls(begun), motion.away)
@@ -220,7 +219,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
         beyond = list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
-        kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
+        kinds = [True] * loop.known.noisy + [False]
     else:
         turn, rate = (float(Fraction(like.get(f"start.{name}", like.get(name, 0)))) for name in ("angle", "rate"))
         tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, list[float]())]
@@ -262,7 +261,8 @@ class Pushed:
         # The law's own potential has no force beside the law's, however far from the target.
         self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
-        demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
+        bounded = all(map(isfinite, against.numbers.values()))
+        demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
         self.larger, self.refused = list[tuple[float, float, str]](), dict[tuple[Any, ...], str]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
@@ -273,8 +273,7 @@ class Pushed:
         if loop.plan is not None:
             planned, about = told_of(loop, loop.plan)
             more, self.evidence = more | planned, self.evidence | about
-        wide, turned, *apart = map(Fraction, self.evidence.get("swayed", ("0", "0")))
-        self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
+        self.radii = [*map(Fraction, self.evidence.get("swayed", ()))]
         changes = change_of_modelled(loop.loop, loop.known.envelope(noisy)) if OUTSIDE in words else (inf,)
         self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
@@ -293,7 +292,8 @@ class Pushed:
         wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
         motion = Held(wired, self.plan)
         self.plan = motion.plan
-        motion.swayed, motion.apart = self.swayed, self.apart
+        if self.radii:
+            motion.sways(self.radii)
         motion.late = weighed(motion, self.scales)
         return V, motion
 
