@@ -22,7 +22,6 @@ from starhold.certification.measured import driven_errors
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import (
     GROWING,
-    LARGER,
     Pushes,
     change_of_modelled,
     late_torque,
@@ -68,7 +67,8 @@ def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]
 
 def _of_detumbling(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     try:
-        words, numbers = bounds_of(recorded.known)
+        # Torques that grow with the rate do so up to the largest one of the claim.
+        words, numbers = bounds_of(recorded.known, above(rational(claim["numbers"]["rate.0"])))
     except NotFoundError as reason:
         yield str(reason)
         return
@@ -164,9 +164,9 @@ def _late(numbers: Mapping[Any, Fraction], late: Late | None) -> Iterator[str]:
     if late is None:
         yield "its torque is not late"
         return
-    for name in KNOWN:
+    for k, name in enumerate(KNOWN):
         x, least = getattr(late, name), stated.get(f"{name}.least")
-        off = least is not None and (late.moment is None or least > fraction(x / LARGER))
+        off = least is not None and (late.moment is None or least > fraction(late.least[k]))
         if off or (name in stated and stated[name] < fraction(x)):
             yield "its torque is late otherwise"
     if isfinite(late.most) and ("most" not in stated or stated["most"] > fraction(late.most)):

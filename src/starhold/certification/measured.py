@@ -20,6 +20,8 @@ from starhold.parts.part import Fitted
 Array = NDArray[np.float64]
 TELLING = ("sensor", "estimator")
 """Roles whose `error` affects the law's measurements."""
+PLACED = frozenset(("position", "velocity"))
+"""What a part may tell that has no bound of its errors."""
 SMALL, MOST, SHARE = 1e-9, 100_000, 0.3
 """What is left of an error that an estimate forgets, as a share; the most cycles from one new attitude to the next in which
 it does; and about what is left after `ago`."""
@@ -125,8 +127,8 @@ def measured(loop: ClosedLoop) -> Measured | None:
 
 def bounded(fitted: Fitted, period: float, estimated: bool = False) -> Errors | None:
     """Read the declared largest errors of a part besides its noise, where they are finite; those of an attitude that is held
-    between updates too, where no estimator waits for them."""
-    tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING else None
+    between updates too, where no estimator waits for them. None of these is one of a place."""
+    tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING and not tells_place(fitted) else None
     largest: Errors = NO_ERRORS if tell is None else tell(fitted.params)
     if tell is None or not all(map(isfinite, largest)):
         return None
@@ -153,6 +155,12 @@ def is_random(noise: Noise) -> bool:
 def shown(sensor: Fitted) -> set[str]:
     """Return the names of a sensor's readings."""
     return set(sensor.part.module.Reading._fields)
+
+
+def tells_place(fitted: Fitted) -> bool:
+    """Return whether a sensor or an estimator tells a position or velocity."""
+    module: Any = fitted.part.module
+    return not PLACED.isdisjoint((module.Reading if fitted.part.role == "sensor" else module.Estimate)._fields)
 
 
 def _estimated(lag: float, tell: Any, given: Any, noise: Noise, rates: list[Any], attitudes: list[Any]) -> Told | None:

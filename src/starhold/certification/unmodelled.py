@@ -10,9 +10,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from starhold.algebra.vector import norm
-from starhold.certification.appendages import appendages
+from starhold.certification.appendages import appendages, tells_momentum
 from starhold.certification.certificate import LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
-from starhold.certification.measured import Told, as_read, bounded, driven_errors, is_random, measured, noise_of, shown
+from starhold.certification.measured import (
+    Told,
+    as_read,
+    bounded,
+    driven_errors,
+    is_random,
+    measured,
+    noise_of,
+    shown,
+    tells_place,
+)
 from starhold.certification.orbit_band import band_of, extremes, movers
 from starhold.certification.target_motion import motion_of
 from starhold.loop.closed_loop import ClosedLoop
@@ -49,7 +59,7 @@ GROWING = (
 SETTLED = ("linear-estimate", "settled-estimate")
 """What a claim about an estimate assumes of it."""
 MORE, LARGER = 1.0 + 1e-12, 1.0 + 1e-6
-"""A margin for the floating-point sum, and one for how a flight follows a lag in steps of at most a tenth of it."""
+"""A margin for the floating-point sum, and one for numbers that other machines may round otherwise."""
 
 
 class Pushes(NamedTuple):
@@ -127,14 +137,32 @@ def grows(loop: ClosedLoop) -> bool:
 
 
 def late_torque(loop: ClosedLoop) -> Late | None:
-    """Return how late the torque is, with a margin for rounding; None where no actuator tells, or more than one is late."""
+    """Return how late the torque is, exactly and as flights follow a lag in their steps, with a margin for rounding; None
+    where no actuator tells, or more than one is late."""
     actuators = _moving(loop)
     tell: Any = actuators[0].part.hook("late") if len(actuators) == 1 else None
     if tell is None:
         return None
     late: Late = tell(actuators[0].params, loop.period)
-    moment = None if late.moment is None else late.moment * LARGER
-    return Late(late.kept * LARGER, late.mean * LARGER, late.most / LARGER, moment)
+    most = late.most / LARGER
+    if late.moment is None:
+        return Late(late.kept * LARGER, late.mean * LARGER, most)
+    exact = late.kept, late.mean, late.moment
+    pairs = [*zip(exact, _in_steps(actuators[0].fastest, loop) or exact, strict=True)]
+    kept, mean, moment = (max(pair) * LARGER for pair in pairs)
+    return Late(kept, mean, most, moment, tuple(min(pair) / LARGER for pair in pairs))
+
+
+def _in_steps(fastest: float, loop: ClosedLoop) -> tuple[float, ...]:
+    """Return what flights make of a lag in the steps of the fourth-order method: what is late in the end of a period, in its
+    mean, and in that by the time that is left, as shares of what it is first; nothing without a rate at which it settles."""
+    step, kept, mean, moment = 1.0 / loop.substeps, 1.0, 0.0, 0.0
+    x = fastest * loop.period * step
+    for _ in range(loop.substeps):
+        moment += step * (mean + step * kept * (0.5 - x / 6.0 + x * x / 24.0))
+        mean += step * kept * (1.0 - x / 2.0 + x * x / 6.0 - x**3 / 24.0)
+        kept *= 1.0 - x + x * x / 2.0 - x**3 / 6.0 + x**4 / 24.0
+    return (kept, mean, moment) if x else ()
 
 
 def _moving(loop: ClosedLoop) -> list[Fitted]:
@@ -156,8 +184,8 @@ def change_of_modelled(loop: ClosedLoop, envelope: Envelope) -> Push:
     for a part that does not say, or if a position is told that could be off."""
     parts = [f for f in loop.used("environment") if f.part.flag("MODELLED")]
     tells: list[Any] = [f.part.hook("torque_change") for f in parts]
-    telling = [*(shown(f) for f in loop.used("sensor")), *(f.part.module.Estimate._fields for f in loop.used("estimator"))]
-    if None in tells or any("position" in names for names in telling):
+    telling = (*loop.used("sensor"), *loop.used("estimator"))
+    if None in tells or any(tells_place(f) for f in telling):
         return Push(inf, inf)
     declared = [Push(0.0), *(tell(f.params, loop.craft, envelope) for tell, f in zip(tells, parts, strict=True))]
     return Push(*(sum(x) * MORE for x in zip(*declared, strict=True)))
@@ -242,17 +270,23 @@ def _is_modelled(part: Part) -> bool:
 def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
     """Whether all that a part does to a loop beside what the law is told has a bound."""
     part, banded = fitted.part, fitted in movers(loop) and bool(band_of(loop).share)
-    always = part.hook("acceleration") is not None and not hasattr(fitted.params, "moves_orbit")
-    if moves(fitted.params) or (always and not banded):
+    if moves(fitted.params) or (_always_moves(fitted) and not banded):
         # No claim follows an orbit that such a force changes.
         return False
     if banded and not part.hook("torque"):
         return True
     torque, error = (push is not None for push in _pushes(fitted, envelope))
     if part.role == "effector":
-        # Beside the command an effector reacts as its momentum turns with the body.
-        return torque and (error or not part.flag("ACTS"))
+        # Beside the command an effector reacts as its momentum turns with the body. No bound is one of its inertia, or of
+        # what a law makes of its momentum.
+        sized = torque and part.hook("inertia") is None
+        return sized and (not part.flag("ACTS") or (error and not tells_momentum(loop, fitted)))
     return _is_idle(loop, fitted, envelope) or torque or error
+
+
+def _always_moves(fitted: Fitted) -> bool:
+    """Return whether a part moves the orbit, whatever its parameters are."""
+    return fitted.part.hook("acceleration") is not None and not hasattr(fitted.params, "moves_orbit")
 
 
 def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool:
@@ -262,7 +296,8 @@ def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool
     if part.role == "sensor" and "magnetic_field" in shown(fitted):
         return bounded(fitted, period) == NO_ERRORS and not is_random(noise_of(fitted, period))
     if part.role == "environment":
-        return _is_modelled(part) or (_pushes(fitted, envelope)[0] is not None and not moves(fitted.params))
+        still = not moves(fitted.params) and not _always_moves(fitted)
+        return _is_modelled(part) or (_pushes(fitted, envelope)[0] is not None and still)
     return part.role in ("sensor", "estimator", "target") or part.name in ("magnetorquers", "inactive-wheels")
 
 
