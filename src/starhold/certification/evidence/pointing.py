@@ -6,9 +6,10 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from importlib import import_module
 from math import degrees, inf, isfinite, pi, radians, sin, sqrt
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.responses import find_response
+from starhold.certification.evidence.shapes import Shape, largest_in, soft
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
 from starhold.certification.matrices import above, floats
@@ -30,7 +32,7 @@ from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand, plus, times, transpose
 from starhold.kernel.plans import Plan
-from starhold.kernel.regions import AT_REST, TURN, Tube, balls, widened
+from starhold.kernel.regions import AT_REST, Tube, balls, widened
 from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread
 from starhold.kernel.theorems.response import first_of, responds
@@ -39,10 +41,8 @@ from starhold.parts.craft import tensor
 linalg: Any = import_module("scipy.linalg")
 Array = NDArray[np.float64]
 
-ANGLES = (175, 150, 120, 90, 75, 60, 45, 35, 30, 25, 20, 15, 10)
+ANGLES = (175, 150, 120, 105, 90, 75, 60, 52, 45, 40, 35, 30, 25, 22, 20, 17, 15, 12, 10, 8, 7, 6, 5, 4, 3, 2, 1, 0.5)
 """The initial rotations (deg) from which convergence is attempted."""
-NEAR = (7, 5, 3, 2, 1, 0.5)
-"""Further ones, for laws that are known near the target alone."""
 RATES = (5, 3, 2, 1, 0.5)
 """The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
 NEARLY = 10.0
@@ -58,6 +58,8 @@ FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 8.0, 20, 24
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
 the largest ratio of successive levels; the most levels and ellipsoids."""
 
+RISES = "V does not decrease on the set from which motions start"
+
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 Beginning: TypeAlias = tuple[list[float], float, dict[str, float], list[float]]
 
@@ -71,6 +73,7 @@ class Chain:
     level: float
     tried: dict[Any, Lower | None] = field(default_factory=dict[Any, "Lower | None"])
     """The results of `lower`, for all chains of one V."""
+    shape: Shape = field(default_factory=lambda: Shape(0.0))
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     response: dict[str, Any] = field(default_factory=dict[str, Any])
@@ -216,7 +219,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
     like: the numbers of a claim, for the same start set and limits, and with noise if it includes noise."""
     if like is None:
         rates = dict.fromkeys((start_rate(loop.loop) * MORE if begun is None else begun, 0.0))
-        angles = list(map(radians, (*ANGLES, *NEAR) if loop.plan is not None or loop.known.late else ANGLES))
+        angles = list(map(radians, ANGLES))
         beyond = list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
@@ -244,6 +247,15 @@ def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pus
     return both if not angle or first.may_begin(angle, rate, begin[2]) else both[::-1]
 
 
+class Lean(NamedTuple):
+    """A V by its shape and digest, the loop with it, and the results of `lower`."""
+
+    shape: Shape
+    V: str
+    motion: Held
+    tried: dict[Any, Lower | None]
+
+
 class Pushed:
     """A loop under unmodelled torques and errors. RefusedError for a law outside the theorem."""
 
@@ -264,7 +276,7 @@ class Pushed:
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
-        self.larger, self.refused = list[tuple[float, float, str]](), dict[tuple[Any, ...], str]()
+        self.larger, self.found = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= numbers_of(loop.known.late)
@@ -277,25 +289,30 @@ class Pushed:
         self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
         changes = change_of_modelled(loop.loop, loop.known.envelope(noisy)) if OUTSIDE in words else (inf,)
         self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
-        self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
-        slow = sqrt(self.stiffness / self.J)
+        slow = sqrt(self.stiffness / float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1]))
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
-        self.leans = [
-            (float(f"{lean * slow:.4g}"), *self.sampled(float(f"{lean * slow:.4g}")), dict[Any, Lower | None]())
-            for lean in LEANS
-        ]
-        # The locally best is tried first, and taken if it descends from the whole set.
-        self.leans.sort(key=lambda lean: Chain(lean[2], lean[1], 0.0, lean[3]).aim())
+        self.known = dict[Shape, Lean]()
+        self.usual = [Shape(float(f"{lean * slow:.4g}")) for lean in LEANS]
 
-    def sampled(self, epsilon: float) -> tuple[str, Held]:
+    @cached_property
+    def leans(self) -> list[Lean]:
+        """Return those of V with the potential as it is, the locally best first, which is taken if it descends from the whole
+        set."""
+        leans = [self.sampled(shape) for shape in self.usual]
+        return sorted(leans, key=lambda lean: Chain(lean.motion, lean.V, 0.0, lean.tried).aim())
+
+    def sampled(self, shape: Shape) -> Lean:
         """Return V and the loop."""
-        V = self.loop.crossed(None if self.even else self.stiffness, epsilon)
-        wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
-        motion = Held(wired, self.plan)
-        self.plan = motion.plan
-        motion.swayed, motion.apart = self.swayed, self.apart
-        motion.late = weighed(motion, self.scales)
-        return V, motion
+        if shape not in self.known:
+            s = None if self.even else self.stiffness
+            V = self.loop.crossed(s, shape.epsilon) if shape in self.usual else self.loop.softened(s, shape)
+            wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
+            motion = Held(wired, self.plan)
+            self.plan = motion.plan
+            motion.swayed, motion.apart = self.swayed, self.apart
+            motion.late = weighed(motion, self.scales)
+            self.known[shape] = Lean(shape, V, motion, {})
+        return self.known[shape]
 
     def claim(self, V: str, numbers: dict[str, Any], **evidence: Any) -> dict[str, Any]:
         """Return the claim with its numbers, and its evidence except that about noise."""
@@ -330,11 +347,13 @@ class Pushed:
     def may_begin(self, angle: float, rate: float, limits: dict[str, float]) -> bool:
         """Return whether there is a start set, which is looked for once."""
         key = angle, rate, *limits.items()
-        if key not in self.refused:
-            self.refused[key] = "" if self.begun(angle, rate, limits, True) is not None else self.loop.failed[POINTS]
-        if self.refused[key]:
-            self.loop.failed[POINTS] = self.refused[key]
-        return not self.refused[key]
+        if key not in self.found:
+            shapes = [chain.shape for chain in self.begun(angle, rate, limits)]
+            self.found[key] = shapes, "" if shapes else self.loop.failed[POINTS]
+        shapes, why = self.found[key]
+        if not shapes:
+            self.loop.failed[POINTS] = why
+        return bool(shapes)
 
     def kept(self, tried: Callable[..., Any], angle: float, rate: float, limits: dict[str, float]) -> bool:
         """Return whether a start is taken, and keep why it is not."""
@@ -344,46 +363,57 @@ class Pushed:
         self.larger.append((angle, rate, start + self.loop.failed[POINTS]))
         return False
 
-    def begun(
-        self, angle: float, rate: float, limits: dict[str, float], examined: bool = False
-    ) -> tuple[dict[str, Any], list[Chain]] | None:
-        """Return the claim's numbers of the start set, and a chain from there for each lean of V; None, and the reason in
-        `failed`, where V does not decrease on the set or, as far as this is examined, the torque exceeds its limits."""
-        loop, J, begun, half = self.loop, self.J, list[Chain](), min(angle, pi) / 2.0
-        numbers = self.numbers | limits
-        numbers |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
-        for epsilon, V, motion, tried in self.leans:
-            motion.late = begun_late(motion, sin(half), rate)
-            rest = 2.0 * float(motion.s) * sin(angle / 4.0) ** 2
-            rest += float(np.linalg.eigvalsh(floats(motion.G)[TURN, TURN])[-1]) * sin(half) ** 2
-            level = rest + J * rate * (rate / 2.0 + epsilon * sin(half))
-            level += float(motion.late.weight * motion.late.begun**2) if motion.late else 0.0
-            motion.late = resting(motion, level * (1.0 + 1e-6))
-            begun.append(Chain(motion, V, level * (1.0 + 1e-6), tried))
-        if asks_more(begun[0].motion, begun[0].level, limits):
-            loop.failed[POINTS] = "the torque exceeds its limit"
-            return None
-        if not any(chain.decreases() for chain in begun):
-            loop.failed[POINTS] = "V does not decrease on the set from which motions start"
-            return None
-        if examined and not begins(loop, self.claim(begun[0].V, numbers | begun[0].of_level()), self.scales):
-            return None
-        return numbers, begun
+    def begun(self, angle: float, rate: float, limits: dict[str, float]) -> list[Chain]:
+        """Return chains from a start set: within limits one, by a V of which the set asks for little torque, else one for
+        each lean of V. None, and the reason in `failed`, where V does not decrease on the set or, as far as this is examined,
+        the torque exceeds its limits there."""
+        loop, numbers = self.loop, self.beginning(angle, rate, limits)
+        if limits:
+            shapes = soft(self.sampled(self.usual[0]).motion, limits, angle, rate)
+            tried = ([self.chain(shape, angle, rate)] for shape in shapes)
+        else:
+            tried = iter([[self.chain(lean.shape, angle, rate) for lean in self.leans]])
+        loop.failed[POINTS] = "the torque exceeds its limit"
+        for chains in tried:
+            first = chains[0]
+            if asks_more(first.motion, first.level, limits):
+                continue
+            if not any(chain.decreases() for chain in chains):
+                loop.failed[POINTS] = RISES
+            elif begins(loop, self.claim(first.V, numbers | first.of_level()), self.scales):
+                return chains
+        return []
+
+    def beginning(self, angle: float, rate: float, limits: dict[str, float]) -> dict[str, Any]:
+        """Return the claim's numbers of a start, without its level."""
+        begin = {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
+        return self.numbers | limits | begin
+
+    def chain(self, shape: Shape, angle: float, rate: float) -> Chain:
+        """Return a chain from the least level set of V that holds a start."""
+        _, V, motion, tried = self.sampled(shape)
+        motion.late = begun_late(motion, sin(min(angle, pi) / 2.0), rate)
+        level = largest_in(motion, angle, rate)
+        level += float(motion.late.weight * motion.late.begun**2) if motion.late else 0.0
+        level *= 1.0 + 1e-6
+        motion.late = resting(motion, level)
+        return Chain(motion, V, level, tried, shape)
 
     def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
         """Find the pointing claim of the loop, and add it. The set contains rotations of up to `angle` (rad) at up to `rate`
         (rad/s); limits: of the torque about each axis (`limit`) or its norm (`limit.norm`), or of wheels."""
-        loop, start_of = self.loop, self.begun(angle, rate, limits or {})
-        if start_of is None:
+        loop, limits = self.loop, limits or {}
+        if not self.may_begin(angle, rate, limits):
             return False
-        numbers, begun = start_of
+        numbers = self.beginning(angle, rate, limits)
+        begun = [self.chain(shape, angle, rate) for shape in self.found[angle, rate, *limits.items()][0]]
         for chain in begun:
             if chain.descend() < NEARLY * chain.aim() and chain.levels:
                 break
         else:
             chain = min(begun, key=lambda one: float(Fraction(one.levels[-1]["end"])) if one.levels else inf)
         if not chain.levels:
-            loop.failed[POINTS] = "V does not decrease on the set from which motions start"
+            loop.failed[POINTS] = RISES
             return False
         motion, start = chain.motion, Fraction(chain.level)
         chain, (angle, fastest) = chain.nearest()
