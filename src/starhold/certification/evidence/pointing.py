@@ -32,7 +32,7 @@ from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand, plus, times, transpose
 from starhold.kernel.plans import Plan
-from starhold.kernel.regions import AT_REST, Tube, balls, widened
+from starhold.kernel.regions import AT_REST, STATE, Tube, balls, widened
 from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread
 from starhold.kernel.theorems.response import first_of, responds
@@ -78,6 +78,13 @@ class Chain:
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     response: dict[str, Any] = field(default_factory=dict[str, Any])
     samples: int = 0
+
+    @property
+    def scales(self) -> dict[str, float]:
+        """Return the sizes of the state in the set, and of all from outside."""
+        motion = self.motion
+        sizes = motion.region(Fraction(self.level)).sizes
+        return {name: float(sizes[name]) or 1.0 for name in (*STATE, *motion.others)}
 
     def aim(self) -> float:
         """Return the level that disturbances allow where all motions are nearly linear."""
@@ -380,7 +387,7 @@ class Pushed:
                 continue
             if not any(chain.decreases() for chain in chains):
                 loop.failed[POINTS] = RISES
-            elif begins(loop, self.claim(first.V, numbers | first.of_level()), self.scales):
+            elif begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
                 return chains
         return []
 
@@ -415,7 +422,7 @@ class Pushed:
         if not chain.levels:
             loop.failed[POINTS] = RISES
             return False
-        motion, start = chain.motion, Fraction(chain.level)
+        motion, start, scales = chain.motion, Fraction(chain.level), chain.scales
         chain, (angle, fastest) = chain.nearest()
         numbers |= chain.of_level()
         numbers["highest"] = float(start + motion.h / 2 * motion.swing(motion.tube(motion.region(start)))) * MORE
@@ -424,4 +431,4 @@ class Pushed:
             loop.failed[POINTS] = "motions do not come near the target"
             return False
         claim = self.claim(chain.V, numbers, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
-        return loop.try_to_show(claim, self.scales)
+        return loop.try_to_show(claim, scales)

@@ -15,7 +15,7 @@ from starhold.algebra.polynomial import exact
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
 from starhold.kernel.numbers import inverse
-from starhold.kernel.regions import RATE, TURN
+from starhold.kernel.regions import RATE, STATE, TURN
 from starhold.kernel.theorems.limits import allocated
 
 Array = NDArray[np.float64]
@@ -60,6 +60,21 @@ def shares(motion: Held, limits: dict[str, Any]) -> Array:
     return np.concatenate(rows)
 
 
+def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
+    """Return the margins of V' for matrices P of V, where q is turned so far, with the acceleration near the target."""
+    bent = any("q0" in m and not m.isdisjoint(STATE[TURN]) for p in motion.u for m in map(frozenset, p.terms))
+    flow, turned = np.zeros(P.shape), q0[:, None, None]
+    flow[:, RATE, RATE], flow[:, RATE, TURN] = acceleration[:, RATE], acceleration[:, TURN] * (turned if bent else 1.0)
+    flow[:, TURN, RATE] = np.eye(3) / 2.0 * turned
+    slope = P @ flow
+    if not motion.even:
+        # 2 p (1 - q0) grows with q.w alone.
+        slope[:, TURN, RATE] += P[:, TURN, TURN] * (1.0 - turned) / 2.0
+    form = -(slope + slope.transpose(0, 2, 1))
+    scale = np.sqrt(np.maximum(np.einsum("nii->ni", form), 1e-300))
+    return np.linalg.eigvalsh(form / scale[:, :, None] / scale[:, None, :])[:, 0]
+
+
 def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> list[Shape]:
     """Return shapes of V of which the level set that holds a start asks for no more than the limits, about, for each margin
     that of the least torque, those of large margins first. motion: with the potential as it is."""
@@ -76,14 +91,16 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> lis
         M = J if shape.moment is None else shape.moment * np.eye(3)
         one[RATE, RATE], one[TURN, TURN] = M / 2.0, shape.soft * potential
         one[RATE, TURN] = one[TURN, RATE] = shape.epsilon / 2.0 * M
-    flow = np.vstack([inner @ torque, np.hstack([np.eye(3) / 2.0, np.zeros((3, 3))])])
     definite = np.linalg.eigvalsh(P)[:, 0] > 0.0
     shapes, P = [s for s, d in zip(shapes, definite, strict=True) if d], P[definite]
     level = largest(P, motion.even, angle, rate)
     asked = np.sqrt(level * np.einsum("li,nij,lj->nl", loads, np.linalg.inv(P), loads).max(1, initial=0.0))
-    falling = -(flow.T @ P + P @ flow)
-    scale = np.sqrt(np.maximum(np.einsum("nii->ni", falling), 1e-300))
-    margins = np.linalg.eigvalsh(falling / scale[:, :, None] / scale[:, None, :])[:, 0]
+    # At rest to every side: over the rates V is least with this of q.
+    stiff = np.linalg.eigvalsh(P[:, TURN, TURN] - P[:, TURN, RATE] @ np.linalg.solve(P[:, RATE, RATE], P[:, RATE, TURN]))
+    far = level / stiff[:, 0]
+    least = np.sqrt(np.maximum(1.0 - far, 0.0)) if motion.even else 1.0 - far / 2.0
+    margins = np.minimum(*(falls(motion, P, inner @ torque, q0) for q0 in (np.ones(len(P)), least)))
+    margins[least <= -(not motion.even)] = -np.inf
     found = dict[Shape, None]()
     for margin in MARGINS:
         tried = np.where(margins > margin, asked, np.inf)
