@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
@@ -16,26 +15,23 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.ellipsoids import HEED, MORE, ends, highest_ratio, smallest
-from starhold.certification.evidence.finding import concluded, read
-from starhold.certification.evidence.lates import begun_late, numbers_of, of_late, resting, weighed
+from starhold.certification.evidence.chains import Chain, Lower
+from starhold.certification.evidence.ellipsoids import MORE
+from starhold.certification.evidence.finding import read
+from starhold.certification.evidence.lates import begun_late, numbers_of, resting, weighed
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
-from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.shapes import Shape, largest_in, soft
-from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
-from starhold.certification.matrices import above, floats
+from starhold.certification.matrices import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, demand, plus, times, transpose
+from starhold.kernel.numbers import RefusedError, demand
 from starhold.kernel.plans import Plan
-from starhold.kernel.regions import AT_REST, STATE, Tube, balls, widened
+from starhold.kernel.regions import AT_REST
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread
-from starhold.kernel.theorems.response import first_of, responds
 from starhold.parts.craft import tensor
 
 linalg: Any = import_module("scipy.linalg")
@@ -54,170 +50,9 @@ NEARER = 0.25
 LEANS = (0.1, 0.18, 0.3, 0.45)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment); the law's
 own V, if it is a form of q, takes the place of the first two terms."""
-FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 8.0, 20, 24
-"""The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
-the largest ratio of successive levels; the most levels and ellipsoids."""
-
 RISES = "V does not decrease on the set from which motions start"
 
-Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 Beginning: TypeAlias = tuple[list[float], float, dict[str, float], list[float]]
-
-
-@dataclass
-class Chain:
-    """Levels from a set down to where disturbances outweigh the damping, and ellipsoids from there on."""
-
-    motion: Held
-    V: str
-    level: float
-    tried: dict[Any, Lower | None] = field(default_factory=dict[Any, "Lower | None"])
-    """The results of `lower`, for all chains of one V."""
-    shape: Shape = field(default_factory=lambda: Shape(0.0))
-    levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
-    ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
-    response: dict[str, Any] = field(default_factory=dict[str, Any])
-    samples: int = 0
-
-    @property
-    def scales(self) -> dict[str, float]:
-        """Return the sizes of the state in the set, and of all from outside."""
-        motion = self.motion
-        sizes = motion.region(Fraction(self.level)).sizes
-        return {name: float(sizes[name]) or 1.0 for name in (*STATE, *motion.others)}
-
-    def aim(self) -> float:
-        """Return the level that disturbances allow where all motions are nearly linear."""
-        lower = self.lower((self.motion.s + self.motion.G[3][3]) / 2**20)
-        return inf if lower is None else float(lower[2])
-
-    def decreases(self) -> bool:
-        """Return whether V decreases on the whole set, down to a lower level."""
-        lower = self.lower(Fraction(self.level))
-        return lower is not None and lower[2] < Fraction(self.level)
-
-    def of_level(self) -> dict[str, Any]:
-        """Return the claim's numbers that follow from its level."""
-        late = of_late(self.motion.late)
-        if self.motion.plan is None:
-            return {"level": self.level} | late
-        off = self.motion.planned(self.motion.region(Fraction(self.level)).sizes)
-        return {"level": self.level} | late | {"plan.error": float(off) * MORE}
-
-    def descend(self) -> float:
-        """Find the levels, and return the last."""
-        c = Fraction(self.level)
-        while len(self.levels) < LEVELS and (lower := self.lower(c)) is not None:
-            tau, beta, floor = lower
-            end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
-            if end > c * Fraction(9, 10):
-                break
-            self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
-            self.samples += periods(self.motion.h * beta, floor, c, end) + on_level(self.motion, end)[1]
-            c = end
-        return float(c)
-
-    def lower(self, c: Fraction) -> Lower | None:
-        """Return tau and beta for the lowest level proved to be reached from another, and that level."""
-        key = c, self.motion.late
-        if key not in self.tried:
-            self.tried[key] = self.lowest(c)
-        return self.tried[key]
-
-    def lowest(self, c: Fraction) -> Lower | None:
-        """Find what `lower` returns."""
-        motion = self.motion
-        try:
-            exact, above, felt, push, rest, spare = motion.fall(on_level(motion, c)[0])
-        except RefusedError:
-            return None
-        Q, H, F = floats(exact), floats(above), floats(felt)
-        if float(np.linalg.eigvalsh(Q)[0]) <= 0.0:
-            return None
-        R = F.T @ F
-        largest = 1.0 / float(linalg.eigh(R, Q, eigvals_only=True)[-1])
-
-        def floor(share: float) -> tuple[float, float, float]:
-            tau = largest * share
-            beta = float(linalg.eigh(Q - tau * R, H, eigvals_only=True)[0]) * (1.0 - 1e-6)
-            beta = min(beta, float(spare) * (1.0 - 1e-6) / float(motion.h))
-            return ((float(push) ** 2 / (4.0 * tau) + float(rest)) / beta if beta > 0.0 else inf), tau, beta
-
-        _, tau, beta = min(floor(share) for share in np.linspace(0.02, 0.98, 33))
-        if beta <= 0.0:
-            return None
-        t, b = Fraction(tau), Fraction(beta)
-        return t, b, (push * push / (4 * t) + rest) / b
-
-    def tighten(self, tube: Tube) -> tuple[float, float]:
-        """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
-        angle, fastest = ends(self.motion, tube, tube.region.X)
-        heed, corners = HEED, self.motion.corners()
-        away = self.motion.away
-        for _ in range(ELLIPSOIDS):
-            within, more = forgotten(self.motion, tube)
-            pushes = self.motion.linear(within)
-            sized = [floats(B) * float(b) for B, b in pushes]
-            ellipsoid = smallest(floats(self.motion.near.A), np.array(list(map(floats, corners))), sized, heed)
-            if ellipsoid is None:
-                break
-            shape, shares = ellipsoid
-            X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
-            added = spread(a, pushes)
-            moved = (plus(added, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
-            rate = max(highest_ratio(after, X) for after in moved)
-            reach = highest_ratio(widened(within.region.X, away), X)
-            inner = self.motion.tube(within.region.within(X, away))
-            end = ends(self.motion, inner, X, away)
-            if rate >= 1.0 or end[0] > angle * 0.99:
-                if not heed:
-                    break
-                heed = 0.0
-                continue
-            self.samples += more
-            self.ellipsoids.append(
-                {
-                    "shape": [[str(x) for x in row] for row in X],
-                    "shares": [str(x) for x in a],
-                    "rate": str(Fraction(rate)),
-                    "reach": str(Fraction(reach)),
-                }
-            )
-            room = 1 - sum(a)
-            fall = 1 - Fraction(rate) * room
-            self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
-            tube, (angle, fastest) = inner, end
-        return angle, fastest
-
-    def nearest(self) -> tuple[Chain, tuple[float, float]]:
-        """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
-        (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
-        tube, _ = on_level(self.motion, Fraction(self.levels[-1]["end"]))
-        one = replace(self, ellipsoids=list[Any]())
-        ends = [(one, one.respond(tube))]
-        if not one.response or self.motion.loop.wheels:
-            ends.append((self, self.tighten(tube)))
-        return min(ends, key=lambda pair: pair[1][0])
-
-    def respond(self, tube: Tube) -> tuple[float, float]:
-        """Find how often the response brings motions nearer, and return the ultimate bounds."""
-        motion, evidence = self.motion, find_response(self.motion)
-        (begun, pulled), rounds = first_of(motion, tube), 0
-        angle, fastest = ends(self.motion, tube, tube.region.X)
-        response = None if evidence is None else concluded(responds(motion, evidence["weights"], evidence["gains"]))
-        while evidence is not None and response is not None and rounds < ROUNDS:
-            try:
-                within, more = forgotten(motion, tube)
-                begun, pulled, inner = response.after(motion, within, begun, pulled)
-            except RefusedError:
-                break
-            end = ends(self.motion, inner, balls(begun), motion.away)
-            if not end[0] < angle * 0.999:
-                break
-            tube, (angle, fastest), rounds = inner, end, rounds + 1
-            self.samples += response.count + more
-            self.response = {"response": evidence | {"rounds": rounds}}
-        return angle, fastest
 
 
 def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float | None = None) -> bool:
@@ -303,8 +138,7 @@ class Pushed:
 
     @cached_property
     def leans(self) -> list[Lean]:
-        """Return those of V with the potential as it is, the locally best first, which is taken if it descends from the whole
-        set."""
+        """Return V with the potential as it is, the locally best first, which is taken if it descends from the whole set."""
         leans = [self.sampled(shape) for shape in self.usual]
         return sorted(leans, key=lambda lean: Chain(lean.motion, lean.V, 0.0, lean.tried).aim())
 
@@ -372,8 +206,8 @@ class Pushed:
 
     def begun(self, angle: float, rate: float, limits: dict[str, float]) -> list[Chain]:
         """Return chains from a start set: within limits one, by a V of which the set asks for little torque, else one for
-        each lean of V. None, and the reason in `failed`, where V does not decrease on the set or, as far as this is examined,
-        the torque exceeds its limits there."""
+        each lean of V. None, and the reason in `failed`, where V does not decrease on the set or the torque exceeds its
+        limits there."""
         loop, numbers = self.loop, self.beginning(angle, rate, limits)
         if limits:
             shapes = soft(self.sampled(self.usual[0]).motion, limits, angle, rate)

@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 
 SOFT = (1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35, 0.29, 0.24, 0.2)
 LEANS = (0.1, 0.18, 0.3, 0.45, 0.6, 0.75, 0.9)
-MARGINS = (0.5, 0.35, 0.22, 0.12, 0.06)
-"""By how much -V' of the linear motion is to be definite, as a share of its diagonal: the more, the more is left for what is
-not linear, for wheels' momentum and for what is sampled."""
+"""The shares of the potential that are tried, and epsilon in sqrt(the potential's stiffness / the largest moment)."""
+WITHIN = (0.98, 0.88, 0.75, 0.6)
+"""Shares of a limit that are tried for the torque of the linear motion: what is not linear, momentum and errors add some."""
 
 
 class Shape(NamedTuple):
@@ -61,7 +61,8 @@ def shares(motion: Held, limits: dict[str, Any]) -> Array:
 
 
 def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
-    """Return the margins of V' for matrices P of V, where q is turned so far, with the acceleration near the target."""
+    """Return for matrices P of V how definite -V' is, as a share of its diagonal, with the acceleration near the target,
+    where q is turned so far. What is left is for what is not linear, for momentum, and for what is sampled."""
     bent = any("q0" in m and not m.isdisjoint(STATE[TURN]) for p in motion.u for m in map(frozenset, p.terms))
     flow, turned = np.zeros(P.shape), q0[:, None, None]
     flow[:, RATE, RATE], flow[:, RATE, TURN] = acceleration[:, RATE], acceleration[:, TURN] * (turned if bent else 1.0)
@@ -76,8 +77,8 @@ def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
 
 
 def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> list[Shape]:
-    """Return shapes of V of which the level set that holds a start asks for no more than the limits, about, for each margin
-    that of the least torque, those of large margins first. motion: with the potential as it is."""
+    """Return shapes of V of which the level set that holds a start asks for no more than the limits, about: for each of some
+    shares those that are softened least, and of them the most definite. motion: with the potential as it is."""
     J, torque = floats(motion.loop.given), floats(motion.near.torque)
     potential, loads = floats(motion.form(motion.s / 2))[TURN, TURN], shares(motion, limits) @ torque
     stiff, moment = float(np.linalg.eigvalsh(potential)[-1]), float(np.trace(J)) / 3.0
@@ -102,8 +103,11 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> lis
     margins = np.minimum(*(falls(motion, P, inner @ torque, q0) for q0 in (np.ones(len(P)), least)))
     margins[least <= -(not motion.even)] = -np.inf
     found = dict[Shape, None]()
-    for margin in MARGINS:
-        tried = np.where(margins > margin, asked, np.inf)
-        if len(tried) and tried.min() < 1.0:
-            found[shapes[int(np.argmin(tried))]] = None
+    softness, ball = np.array([s.soft for s in shapes]), np.array([s.moment is not None for s in shapes])
+    for share, about in product(WITHIN, (False, True)):
+        fit = (asked < share) & (margins > 0.0) & (ball == about)
+        # About all axes alike the gyroscopic torque does work: there the most definite one is taken.
+        fit &= about | (softness == softness[fit].max(initial=0.0))
+        if fit.any():
+            found[shapes[int(np.argmax(np.where(fit, margins, -np.inf)))]] = None
     return list(found)
