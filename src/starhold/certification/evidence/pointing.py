@@ -118,7 +118,7 @@ class Pushed:
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
-        self.larger, self.found = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
+        self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= numbers_of(loop.known.late)
@@ -188,10 +188,10 @@ class Pushed:
     def may_begin(self, angle: float, rate: float, limits: dict[str, float]) -> bool:
         """Return whether there is a start set, which is looked for once."""
         key = angle, rate, *limits.items()
-        if key not in self.found:
+        if key not in self.beginnings:
             shapes = [chain.shape for chain in self.begun(angle, rate, limits)]
-            self.found[key] = shapes, "" if shapes else self.loop.failed[POINTS]
-        shapes, why = self.found[key]
+            self.beginnings[key] = shapes, "" if shapes else self.loop.failed[POINTS]
+        shapes, why = self.beginnings[key]
         if not shapes:
             self.loop.failed[POINTS] = why
         return bool(shapes)
@@ -247,7 +247,7 @@ class Pushed:
         if not self.may_begin(angle, rate, limits):
             return False
         numbers = self.beginning(angle, rate, limits)
-        begun = [self.chain(shape, angle, rate) for shape in self.found[angle, rate, *limits.items()][0]]
+        begun = [self.chain(shape, angle, rate) for shape in self.beginnings[angle, rate, *limits.items()][0]]
         for chain in begun:
             if chain.descend() < NEARLY * chain.aim() and chain.levels:
                 break

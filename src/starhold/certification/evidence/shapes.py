@@ -49,7 +49,7 @@ def largest(P: Array, even: bool, angle: float, rate: float) -> Array:
 
 
 def shares(motion: Held, limits: dict[str, Any]) -> Array:
-    """Return rows of which the products with the torque that is asked for are shares of its limits."""
+    """Return rows of which the products with the torque that is used for are shares of its limits."""
     rows = [np.zeros((0, 3))]
     rows += [np.eye(3) / x for name, x in limits.items() if name.startswith("limit")]
     count = next(k for k in range(1000) if f"wheel.{k}.axis.0" not in motion.loop.claim.subject)
@@ -95,19 +95,19 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> lis
     definite = np.linalg.eigvalsh(P)[:, 0] > 0.0
     shapes, P = [s for s, d in zip(shapes, definite, strict=True) if d], P[definite]
     level = largest(P, motion.even, angle, rate)
-    asked = np.sqrt(level * np.einsum("li,nij,lj->nl", loads, np.linalg.inv(P), loads).max(1, initial=0.0))
+    used = np.sqrt(level * np.einsum("li,nij,lj->nl", loads, np.linalg.inv(P), loads).max(1, initial=0.0))
     # At rest to every side: over the rates V is least with this of q.
     stiff = np.linalg.eigvalsh(P[:, TURN, TURN] - P[:, TURN, RATE] @ np.linalg.solve(P[:, RATE, RATE], P[:, RATE, TURN]))
     far = level / stiff[:, 0]
     least = np.sqrt(np.maximum(1.0 - far, 0.0)) if motion.even else 1.0 - far / 2.0
     margins = np.minimum(*(falls(motion, P, inner @ torque, q0) for q0 in (np.ones(len(P)), least)))
     margins[least <= -(not motion.even)] = -np.inf
-    found = dict[Shape, None]()
+    chosen = dict[Shape, None]()
     softness, ball = np.array([s.soft for s in shapes]), np.array([s.moment is not None for s in shapes])
     for share, about in product(WITHIN, (False, True)):
-        fit = (asked < share) & (margins > 0.0) & (ball == about)
+        fit = (used < share) & (margins > 0.0) & (ball == about)
         # About all axes alike the gyroscopic torque does work: there the most definite one is taken.
         fit &= about | (softness == softness[fit].max(initial=0.0))
         if fit.any():
-            found[shapes[int(np.argmax(np.where(fit, margins, -np.inf)))]] = None
-    return list(found)
+            chosen[shapes[int(np.argmax(np.where(fit, margins, -np.inf)))]] = None
+    return list(chosen)
