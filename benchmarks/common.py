@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -147,25 +147,18 @@ def gap(a: State, b: State) -> tuple[float, float, float]:
     return float(angle), rate, away
 
 
-Control = Callable[[Quaternion, Any, Any], Any]
-"""Torque from attitude, rate and position (inertial), called at each control instant."""
-
-
-def in_basilisk(control: Control | str, start: State = START) -> Callable[[int], State]:
+def in_basilisk(control: str, start: State = START) -> Callable[[int], State]:
     """The problem in Basilisk; the result flies it for a number of steps from where it was and gives the state.
 
-    control: "feedback" (Basilisk's own flight-software modules), "steady" (a constant torque, no flight software), or a
-    function, called from a Basilisk module in Python. The models run in such an order that the torque of a state is
-    held from that instant on.
+    control: "feedback" (Basilisk's own flight-software modules), or "steady" (a constant torque, no flight software). The
+    models run in such an order that the torque of a state is held from that instant on.
     """
     simulation, body, actuator, kept = body_in_basilisk(start)
     tick = round(PERIOD * 1e9)
     if control == "feedback":
         kept += flight_software(simulation, body, actuator, FEEDBACK_GAINS)
-    elif control == "steady":
-        actuator.extTorquePntB_B = [[x] for x in STEADY_TORQUE]
     else:
-        kept += _python_control(simulation, body, actuator, cast(Control, control))
+        actuator.extTorquePntB_B = [[x] for x in STEADY_TORQUE]
     simulation.AddModelToTask("task", actuator)
     simulation.InitializeSimulation()
     done = 0
@@ -254,30 +247,3 @@ def flight_software(simulation: Any, body: Any, actuator: Any, gains: Gains, gyr
     for model in (sensor, goal, error, law):
         simulation.AddModelToTask("task", model)
     return [sensor, goal, error, law, told]
-
-
-def _python_control(simulation: Any, body: Any, actuator: Any, control: Control) -> list[Any]:
-    from Basilisk.architecture import messaging, sysModel
-
-    class Controller(sysModel.SysModel):
-        """Calls `control` with the state Basilisk has reached."""
-
-        def __init__(self) -> None:
-            super().__init__()
-            self.ModelTag = "controller"
-            self.command = messaging.CmdTorqueBodyMsg()
-
-        def Reset(self, CurrentSimNanos: int) -> None:  # noqa: N802 Basilisk calls it by this name
-            pass
-
-        def UpdateState(self, CurrentSimNanos: int) -> None:  # noqa: N802
-            reached = body.scStateOutMsg.read()
-            torque = control(as_quaternion(reached.sigma_BN), np.array(reached.omega_BN_B), np.array(reached.r_CN_N))
-            payload = messaging.CmdTorqueBodyMsgPayload()
-            payload.torqueRequestBody = np.asarray(torque).tolist()
-            self.command.write(payload, CurrentSimNanos, self.moduleID)
-
-    controller = Controller()
-    actuator.cmdTorqueInMsg.subscribeTo(controller.command)
-    simulation.AddModelToTask("task", controller)
-    return [controller]

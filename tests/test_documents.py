@@ -222,8 +222,8 @@ def test_commands_of_the_overview_run_from_top_to_bottom(tmp_path):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     for line in commands():
-        if line.startswith(("starhold serve", "starhold studio")):
-            # They end when others end them: tests/cli/test_serve_cli.py, tests/studio.
+        if line.startswith(("starhold serve", "starhold studio", "starhold reproduce all")):
+            # Two end when others end them: tests/cli/test_serve_cli.py, tests/studio. All publications: tests/publications.
             continue
         settings = {"cwd": tmp_path, "env": {**os.environ, "PATH": path}, "capture_output": True, "text": True}
         done = subprocess.run(line, shell=True, timeout=1800, **settings)

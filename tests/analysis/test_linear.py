@@ -95,14 +95,6 @@ def test_poles_are_the_certified_roots():
     assert np.abs(found).max() <= claim.numbers["radius"] * (1 + 1e-12)
 
 
-def test_sampling_is_that_of_python_control():
-    linear = linearise(loop_of("cubesat-slew", "pd"))
-    plant = linear.plant
-    told = control.ss(plant.A, plant.B, plant.C, plant.D).sample(linear.period, method="zoh")
-    np.testing.assert_allclose(linear.stepped.A, told.A, atol=1e-13)
-    np.testing.assert_allclose(linear.stepped.B, told.B, atol=1e-13)
-
-
 @pytest.mark.parametrize("parts", [0, 3, 10, 13, 20, 27])
 def test_a_delayed_command_is_sampled_exactly(parts):
     """Against steps of a tenth of a period, in which the command in force is looked up."""

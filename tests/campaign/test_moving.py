@@ -121,7 +121,13 @@ def test_numbers_made_at_once_are_those_of_each_runs_own_scenario(case):
     assert any(np.unique(row).size > 1 for row in apart.values())
 
 
-def test_scenarios_and_equations_made_do_not_grow_with_the_runs(monkeypatch):
+ORBITING = PARTS | {"orbit": MAGNET["orbit"], "target": {"mode": "orbital"}}
+FILTERED = {"orbit.raan": uniform(0.0, 6.28), "orbit.altitude": normal(1e4)}
+FILTERED |= {"part.mekf.cross": SHARE, "part.mekf.bias": SHARE}
+
+
+@pytest.mark.parametrize("case", [CASES["all"], (LYAPUNOV, ORBITING, FILTERED)])
+def test_scenarios_and_equations_made_do_not_grow_with_the_runs(case, monkeypatch):
     """Counts, for times depend on the machine."""
     made = []
     for module, name in ((lane_making, "build"), (moving, "Compiled")):
@@ -129,11 +135,10 @@ def test_scenarios_and_equations_made_do_not_grow_with_the_runs(monkeypatch):
         monkeypatch.setattr(
             module, name, lambda *given, name=name, plainly=plainly, **more: (made.append(name), plainly(*given, **more))[1]
         )
-    plan, lanes = lanes_of(*CASES["all"])
+    plan, lanes = lanes_of(*case)
     assert made.count("Compiled") == 1
-    begun = made.count("build")
     # To find out what each draw moves: the first run, two others of each, and the runs on which all is tried.
-    assert begun < 30
+    assert made.count("build") < 30
     counts = []
     for count in (10, 1500):
         made.clear()
@@ -190,22 +195,6 @@ def test_draws_that_no_equation_follows_are_built_one_by_one():
         plan, lanes = lanes_of(law, tables, over, runs=40)
         assert not lanes.at_once
         assert numbers_in(plan, lanes, 0, 3)
-
-
-def test_what_is_drawn_of_an_orbit_and_a_filter_builds_no_scenario_for_each_run(monkeypatch):
-    made = []
-    plainly = lane_making.build
-    monkeypatch.setattr(lane_making, "build", lambda *given, **more: (made.append(1), plainly(*given, **more))[1])
-    over = {
-        "orbit.raan": uniform(0.0, 6.28),
-        "orbit.altitude": normal(1e4),
-        "part.mekf.cross": SHARE,
-        "part.mekf.bias": SHARE,
-    }
-    plan, lanes = lanes_of(LYAPUNOV, PARTS | {"orbit": MAGNET["orbit"], "target": {"mode": "orbital"}}, over)
-    made.clear()
-    numbers_in(plan, lanes, 100, 1000)
-    assert len(made) == 2
 
 
 def test_an_altitude_without_the_unit_that_its_file_would_need_is_left_to_each_runs_own_scenario():

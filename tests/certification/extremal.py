@@ -37,7 +37,7 @@ class Scheduled:
 
 class Motion(NamedTuple):
     """What a period does, a lane each: to (w, q), (lanes, 6, 6), and what a push, and errors of the attitude and of the rate
-    that the law is told, make of it, (lanes, 6, 3)."""
+    that the law is told, make of it, (lanes, 6, 3); with the torque that acts as a further vector where it is late."""
 
     A: np.ndarray
     push: np.ndarray
@@ -67,17 +67,22 @@ class Steered(Attack):
         self.bounds = self.fleet_of.around._replace(noise=None)
         self.inverse = np.linalg.inv(self.true)
 
-    def after(self, around, q, w, push=0.0, attitude=0.0, rate=0.0):
-        """(w, q) after the first period with a held push, and what the law is told off by such vectors."""
+    def after(self, around, q, w, push=0.0, attitude=0.0, rate=0.0, torque=0.0):
+        """(w, q) after the first period with a held push, and what the law is told off by such vectors; and the torque that
+        acts, if it is late."""
         zero, h = np.zeros(w.shape), self.numbers["period"]
         bounds = around.bounds
         around.bounds, kept = bounds._replace(turned=1.0, rated=1.0, change=(np.inf, 0.0)), around.kept
         around.load, around.told = zero, 0.0 * around.told
         command = around.command(self.fleet_of.law, q, w, 0.0, zero, (attitude + zero, rate + zero))
+        fleet, acting, late = self.fleet_of, [command] * 2, self.fleet_of.late
+        if late:
+            fleet.before, fleet.off = command, torque - command
+            acting = fleet.acting(command, 2)
         for k in range(2):
-            q, w = around.after(q, w, (k + 0.5) * h / 2, command + push, zero, h / 2)
+            q, w = around.after(q, w, (k + 0.5) * h / 2, acting[k] + push, zero, h / 2)
         around.bounds, around.kept = bounds, kept
-        return np.concatenate([w, q[1:]])
+        return np.concatenate([w, q[1:], command + fleet.off] if late else [w, q[1:]])
 
     def motion(self, axis, kept):
         """The motion near the target, as it turns, with these momenta."""
@@ -90,16 +95,18 @@ class Steered(Attack):
             return (sides[1] - sides[0]).T / (2 * SMALL)
 
         def beside(k, **others):
-            return lambda s: (rest, zero, *(s * np.eye(3)[:, k : k + 1] * others.get(n, 0.0) for n in ("p", "a", "r")))
+            return lambda s: (rest, zero, *(s * np.eye(3)[:, k : k + 1] * others.get(n, 0.0) for n in "part"))
 
         def state(k):
             axis = np.eye(3)[:, k % 3 : k % 3 + 1] + zero
+            if k >= 6:
+                return beside(k - 6, t=1.0)
             if k < 3:
                 return lambda s: (rest, s * axis)
             return lambda s: (np.concatenate([np.full((1, lanes), np.sqrt(1 - s * s)), s * axis]), zero)
 
-        A = np.stack([slopes(state(k)) for k in range(6)], axis=2)
-        return Motion(A, *(np.stack([slopes(beside(k, **{n: 1.0})) for k in range(3)], axis=2) for n in ("p", "a", "r")))
+        A = np.stack([slopes(state(k)) for k in range(9 if self.fleet_of.late else 6)], axis=2)
+        return Motion(A, *(np.stack([slopes(beside(k, **{n: 1.0})) for k in range(3)], axis=2) for n in "par"))
 
     def samples(self, motion):
         """In how many samples nothing is left of how a flight began."""
@@ -112,26 +119,30 @@ class Steered(Attack):
         axis = along(cross(lean, self.rng.normal(size=lean.shape)))
         return axis, -(self.numbers.get("momentum") or 0.0) * along(cross(lean, axis))
 
+    def aims(self, motion, ends):
+        """What counts of a state at the last sample."""
+        return np.concatenate([0.0 * ends, ends, *[0.0 * ends] * (motion.A.shape[1] // 3 - 2)])
+
     def noisy(self, motion, ends, count):
         """Errors of attitude and rate, (samples, 6, lanes), which noise makes when the motion that it drives comes to the
         border of what the claim says is rare, in the directions `ends` at the last sample."""
         noise = self.noise(1, self.rng)
         size, every = len(noise.x), len(noise.steps)
         made = np.concatenate([motion.attitude, motion.rate], axis=2)
-        way, felt, wanted = np.concatenate([0.0 * ends, ends]), np.zeros((size, ends.shape[1])), []
+        way, felt, wanted = self.aims(motion, ends), np.zeros((size, ends.shape[1])), []
         for k in reversed(range(count)):
             step = noise.steps[(k + 1) % every]
             slope = step[size:].T @ np.einsum("nik,in->kn", made, way) + step[:size].T @ felt
             felt, way = slope[:size], np.einsum("nij,in->jn", motion.A, way)
             wanted.append(slope[size:])
-        x, z, errors, most = np.zeros((size, ends.shape[1])), np.zeros((6, ends.shape[1])), [], np.zeros(ends.shape[1])
+        x, z, errors, most = np.zeros((size, ends.shape[1])), 0.0 * way, [], np.zeros(ends.shape[1])
         radii = self.radii()[:4]
         for k, n in enumerate(reversed(wanted)):
             y = noise.steps[(k + 1) % every] @ np.concatenate([x, n])
             x = y[:size]
             errors.append(y[size:])
             z = np.einsum("nij,jn->in", motion.A, z) + np.einsum("nij,jn->in", made, y[size:])
-            sizes = np.array([np.linalg.norm(part, axis=0) for part in (y[size : size + 3], y[size + 3 :], z[:3], z[3:])])
+            sizes = np.array([np.linalg.norm(part, axis=0) for part in (y[size : size + 3], y[size + 3 :], z[:3], z[3:6])])
             most = np.maximum(most, (sizes / radii).max(axis=0))
         return [one / most for one in errors]
 
@@ -143,7 +154,7 @@ class Steered(Attack):
         motion = self.motion(axis, kept)
         last = self.samples(motion)
         count = 2 * last
-        ways = [np.concatenate([0.0 * ends, ends])]
+        ways = [self.aims(motion, ends)]
         for _ in range(last - 1):
             ways.append(np.einsum("nij,in->jn", motion.A, ways[-1]))
         # Momentum turns in the target's axes, once around in a turn of it.

@@ -30,9 +30,9 @@ def test_hunted_scenarios(seed, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(1000, 1100, 50))
+@pytest.mark.parametrize("first", [1000, 1025])
 def test_many_random_scenarios(first, tmp_path):
-    for seed in range(first, first + 50):
+    for seed in range(first, first + 15):
         text = random_scenario(np.random.default_rng(seed), tmp_path)
         assert fault_in(text, tmp_path) == "", text
 
@@ -44,7 +44,7 @@ def test_a_law_that_clips_its_torque_is_certified(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(0, 80, 20))
+@pytest.mark.parametrize("first", range(0, 80, 40))
 def test_no_flight_contradicts_what_is_proved_of_flights_like_it(first, tmp_path):
     for seed in range(first, first + 20):
         random = np.random.default_rng(seed)

@@ -127,8 +127,7 @@ def test_resume_flies_what_is_missing_and_no_more(place):
     out = place / "out"
     digest = json.loads((out / "campaign.json").read_text())["digest"]
 
-    def resume(*words, text=SMALL):
-        (place / "small.toml").write_text(text)
+    def resume(*words):
         return starhold(
             "campaign", "small.toml", "--no-search", "--resume", "--threads", "1", *words, "-o", "out", cwd=place
         )
@@ -151,9 +150,6 @@ def test_resume_flies_what_is_missing_and_no_more(place):
     assert json.loads((out / "campaign.json").read_text())["runs"] == dict.fromkeys(LAWS, 30)
     assert f"digest {digest}" not in more.stdout
     complains(resume("--runs", "29"), "campaign.runs: 29, was 30")
-    complains(resume(text=SMALL.replace("high = 2.5", "high = 2.6")), 'over."law.pd.k_rate".high: 2.6, was 2.5')
-    complains(resume("--seed", "5"), "seed: 5, was 1")
-    complains(resume("--law", "pd"), "laws")
     # What is the same is no change, whether or not the file says it.
     assert resume("--runs", "30", "--seed", "1").returncode == 0
 

@@ -3,12 +3,13 @@
 import erfa
 import numpy as np
 import pytest
+import xarray as xr
 from ccsds_ndm.mapping import NDMFileFormats
 from ccsds_ndm.ndm_io import NdmIo
 from scipy.spatial.transform import Rotation
 
 import starhold as sh
-from starhold.export.aem import parse_aem, write_aem
+from starhold.export.aem import parse_aem
 from starhold.parts.epoch import days_of, precession
 from tests.running import starhold
 
@@ -40,9 +41,8 @@ START = "2026-059T23:59:59"
 
 
 def written(tmp_path, version):
-    path = tmp_path / "run.aem"
-    write_aem(path, TIMES, ATTITUDES, version=version, **ABOUT)
-    return path
+    run = xr.Dataset({"attitude": (("time", "quaternion"), ATTITUDES)}, {"time": TIMES})
+    return sh.export_aem(run, tmp_path / "run.aem", version=version, **ABOUT)
 
 
 @pytest.mark.parametrize("version", ["1.0", "2.0"])

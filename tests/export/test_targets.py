@@ -1,8 +1,7 @@
-"""The self-test runs on processors that fly: SPARC V8 (LEON3), SPARC V9, ARM and RISC-V, emulated in user mode. Skipped,
-with the reason, where a compiler or the emulator is not installed."""
+"""The self-test runs on SPARC V8 (LEON3), emulated in user mode; other processors have `link/test_qemu.py`. It is skipped,
+with the reason, where the compiler or the emulator is not installed."""
 
 import subprocess
-from pathlib import Path
 
 import pytest
 
@@ -10,12 +9,6 @@ from starhold.export.folder import make_files
 from tests.export.flown import build_in, code_of, need
 from tests.tiers import leading
 
-LINUX = {
-    "ARMv7": ("arm-linux-gnueabihf-gcc", "qemu-arm"),
-    "RISC-V 64": ("riscv64-linux-gnu-gcc", "qemu-riscv64"),
-    "SPARC V9": ("sparc64-linux-gnu-gcc", "qemu-sparc64"),
-}
-NAMES = ["wheel", "estimator"]
 _HEADERS = {
     "math.h": 'double sqrt(double);\n#define INFINITY (__builtin_inf())\n#define NAN (__builtin_nan(""))\n',
     "stdio.h": "int printf(const char *, ...);\n",
@@ -51,28 +44,7 @@ __asm__(".globl _start\n_start:\n mov 0, %fp\n sub %sp, 96, %sp\n call main\n no
 """
 
 
-def put(name: str, folder: Path) -> tuple[str, ...]:
-    """Write the files of a law; the C among them."""
-    files = make_files(code_of(name), "test", name).files
-    for file, text in files.items():
-        (folder / file).write_text(text)
-    return tuple(file for file in files if file.endswith(".c"))
-
-
-@pytest.mark.parametrize("name", leading(NAMES))
-@pytest.mark.parametrize("target", leading(LINUX))
-def test_linux(target, name, tmp_path):
-    compiler, emulator = LINUX[target]
-    need(compiler, emulator)
-    sources = put(name, tmp_path)
-    for level in ("-O0", "-O2"):
-        build_in(tmp_path, compiler, "-std=c99", "-ffp-contract=off", level, "-static", *sources, "-o", "test", "-lm")
-        done = subprocess.run([emulator, str(tmp_path / "test")], capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout
-        assert "of 192 steps give the bits" in done.stdout
-
-
-@pytest.mark.parametrize("name", leading(NAMES))
+@pytest.mark.parametrize("name", leading(["wheel", "estimator"]))
 def test_leon3(name, tmp_path):
     """SPARC V8 without a library: main's value alone tells; a vector with one bit changed must fail."""
     compiler = "sparc64-linux-gnu-gcc"
@@ -81,7 +53,10 @@ def test_leon3(name, tmp_path):
     for file, text in _HEADERS.items():
         (tmp_path / "include").mkdir(exist_ok=True)
         (tmp_path / "include" / file).write_text(text)
-    sources = put(name, tmp_path)
+    files = make_files(code_of(name), "test", name).files
+    for file, text in files.items():
+        (tmp_path / file).write_text(text)
+    sources = [file for file in files if file.endswith(".c")]
     (tmp_path / "bare.c").write_text(_BARE)
     flags = "-m32 -mcpu=leon3 -O2 -std=c99 -ffp-contract=off -fno-math-errno -nostdlib -nostdinc -static -isystem include"
     flags = [*flags.split(), "-isystem", own]

@@ -30,12 +30,20 @@ class Driven:
 
     def held(self):
         """The motion of (w, q) near rest over a period, and what errors of attitude and rate that the law is told make of
-        it."""
+        it; with the torque that acts as a further vector where it lags."""
         (C, K), zero = self.linear(), np.zeros((3, 3))
         N = np.linalg.inv(self.J)
         drift = np.block([[zero, zero, N], [np.eye(3) / 2, zero, zero], [np.zeros((3, 9))]])
         Phi = expm(drift * self.numbers["period"])[:6]
-        return Phi[:, :6] - Phi[:, 6:] @ np.hstack([C, K]), -Phi[:, 6:] @ np.hstack([K / 2, C])
+        told, asked, n = np.hstack([K / 2, C]), np.hstack([C, K]), self.numbers
+        if "late.torque.moment" not in n:
+            return Phi[:, :6] - Phi[:, 6:] @ asked, -Phi[:, 6:] @ told
+        # The torque begins as it was, and ends nearer to what is asked for.
+        h, (kept, mean, moment) = n["period"], (n[f"late.torque.{name}"] for name in ("kept", "mean", "moment"))
+        begun = np.vstack([h * mean * N, h * h / 2 * moment * N])
+        ends, both = Phi[:, 6:] - begun, np.hstack([begun.T, kept * np.eye(3)]).T
+        later = np.vstack([ends, (1 - kept) * np.eye(3)])
+        return np.hstack([np.vstack([Phi[:, :6], np.zeros((3, 6))]) - later @ asked, both]), -later @ told
 
     def shaken(self):
         """What a torque that is held makes of the motion of (w, q) near rest, in deviations of the random torque."""
@@ -48,11 +56,11 @@ class Driven:
         and turns that they cause in the linear motion, in lanes with maps of their own of (w, q) and of these errors."""
         lanes, (A, B) = len(maps), map(np.array, zip(*maps, strict=True))
         noise, random, shaken = self.noise(lanes, np.random.default_rng(2)), np.random.default_rng(3), self.shaken()
-        x, most = np.zeros((6, lanes)), np.zeros((4, lanes))
+        x, most = np.zeros((A.shape[1], lanes)), np.zeros((4, lanes))
         for k in range(-begun, samples):
             told, rate = noise.told()
-            sizes = [np.linalg.norm(part, axis=0) for part in (told, rate, x[:3], x[3:])]
+            sizes = [np.linalg.norm(part, axis=0) for part in (told, rate, x[:3], x[3:6])]
             x = np.einsum("nij,jn->in", A, x) + np.einsum("nij,jn->in", B, np.concatenate([told, rate]))
-            x = x + shaken @ random.normal(size=(3, lanes)) if shaken.any() else x
+            x[:6] += shaken @ random.normal(size=(3, lanes)) if shaken.any() else 0.0
             most = np.maximum(most, sizes) if k >= 0 else most
         return most

@@ -12,11 +12,6 @@ from starhold.certification.certify import certify
 from starhold.checker import check, passed
 from starhold.scenario.building import build
 
-LAWS = [
-    ("three-laws", "lyapunov"), ("three-laws", "sliding"), ("cubesat-slew", "pd"), ("cubesat-slew", "sliding"),
-    ("geostationary", "matrix-pd"), ("wheels-orbital", "wheel"),
-]  # fmt: skip
-
 
 @cache
 def loop_of(scenario, law):

@@ -17,17 +17,20 @@ from starhold.certification.evidence.finding import certificate, read
 from starhold.certification.proofs import pointed
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import late_torque, named
+from starhold.conformance.parts import examine_part, find_part
 from starhold.kernel.check import check
-from starhold.kernel.follower import REST
+from starhold.kernel.follower import FIRST, REST
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.theorems.pointing import forgotten, on_level
 from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
+from starhold.scenario.reading import parse
 from starhold.studies.compare import record
-from tests.certification.attack import Attack
+from tests.certification.attack import Attack, flown
 from tests.kernel.flights import Around, along
+from tests.parts.files import BODY, FILES, PD, part
 from tests.tiers import leading
 
 LATE = [(("lag", 0.05),), (("rate-limit", 0.1),), (("lag", 0.5),)]
@@ -58,6 +61,23 @@ def test_an_actuator_that_lags_is_in_the_claim_and_no_flight_breaks_it(late):
     found, shares = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, 3).worst()
     assert found == ""
     assert max(shares) > 0.1
+
+
+def test_one_file_with_an_actuator_that_says_how_late_it_is_is_in_the_claim_checked_and_flown(tmp_path):
+    (tmp_path / "drive.py").write_text(FILES["drive.py"])
+    text = BODY + "substeps = 8\n" + part('file = "drive.py"\nbandwidth = "2 Hz"\n') + PD
+    scenario = parse(text, "own", tmp_path)
+    loop = build(scenario, scenario.laws[0])
+    claim, _ = pointed(make_subject(loop))
+    assert claim.numbers["late_torque"] > 0.0
+    (whole,) = named([claim], loop, 0.0)
+    assert not [name for name in whole.assumptions if name.startswith("without:drive")]
+    assert "late-alike" in whole.assumptions
+    assert 0.0 < flown(loop, claim, np.random.default_rng(1), 16) <= 1.0
+    wrong = tmp_path / "faster.py"
+    wrong.write_text(FILES["drive.py"].replace("x = fastest", "x = 1.1 * fastest"))
+    for path, passed in ((tmp_path / "drive.py", True), (wrong, False)):
+        assert passed == all(v.outcome != "failed" for v in examine_part(find_part(str(path))))
 
 
 def test_a_lag_that_makes_the_loop_unstable_is_left_out_by_name():
@@ -151,21 +171,26 @@ def test_no_period_exceeds_the_bounds_of_what_is_late_and_some_come_near_them(la
     held = Held(AttitudeLoop(read(claim.proof.claim, dict(claim.proof.programs)), remembers=True))
     attack, rng = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, 1), np.random.default_rng(2)
     (tube, _), lanes = on_level(held, Fraction(claim.proof.claim["evidence"]["levels"][-1]["end"])), 4000
+    held.nears(tube)
     first, _ = forgotten(held, tube)
     unit, way = (along(rng.normal(size=(3, lanes))) for _ in range(2))
     x = np.linalg.cholesky(floats(tube.region.X)) @ along(rng.normal(size=(6, lanes))) * 10.0 ** rng.integers(-4, 1, lanes)
+    kept, full = float(held.late.kept), rng.choice([0.0, 1.0], lanes)
 
-    def share(tube, whole, e, S):
-        change, sizes = held.change_in(tube, whole), np.linalg.norm(e + S @ x, axis=0)
+    def share(e, bound):
         after, asked = period(held, attack, x, e, unit)
-        bound = np.linalg.norm(floats(change.M) @ x, axis=0) + float(change.rest) + float(change.kept) * sizes
-        return after, float((np.linalg.norm(float(held.late.kept) * e - asked + S @ after, axis=0) / bound).max())
+        return after, float((np.linalg.norm(kept * e - asked, axis=0) / bound(np.linalg.norm(e, axis=0))).max())
 
-    e = float(tube.late.most) * way * rng.choice([0.0, 1.0], lanes)
-    assert 0.95 < share(tube, False, e, np.zeros((3, 6)))[1] <= 1.0
-    S = floats(held.steady.S) if held.steady else np.zeros((3, 6))
-    after, worst = share(first, True, float(first.region.sizes[REST]) * way * rng.choice([0.0, 1.0], lanes) - S @ x, S)
-    assert 0.95 < worst <= 1.0
+    change = held.change_in(tube)
+    moved = np.linalg.norm(floats(change.M) @ x, axis=0) + float(change.rest)
+    assert 0.95 < share(float(tube.late.most) * way * full, lambda e: moved + float(change.kept) * e)[1] <= 1.0
+    # Near the target: by how much it changes, and where the state is from the linear motion.
+    linear, rest = map(float, held.lateness(first))
+    errors = 2.0 * float(held.mistaken(first)) * bool(held.inexact)
+    late = [float(first.region.sizes[name]) * v * full for name, v in ((FIRST, unit), (REST, way))]
+    after, worst = share(sum(late), lambda e: kept * e + (1.0 - kept) * (linear + rest - errors) + errors)
+    assert 0.3 < worst <= 1.0
     ways = np.vstack([np.eye(6), rng.normal(size=(300, 6))])
-    most = sum(np.linalg.norm(ways @ floats(B), axis=1) * float(b) for B, b in held.linear(first))
-    assert 0.9 < float((np.abs(ways @ (after - floats(held.near.A) @ x)) / most[:, None]).max()) <= 1.0
+    most = sum(np.linalg.norm(ways @ floats(B)[:6], axis=1) * float(b) for B, b in held.linear(first))
+    state = np.vstack([x, floats(held.near.torque) @ x + late[0]])[: len(held.near.A)]
+    assert 0.9 < float((np.abs(ways @ (after - floats(held.near.A)[:6] @ state)) / most[:, None]).max()) <= 1.0

@@ -360,5 +360,5 @@ def test_the_program_may_be_another_one_only_with_its_moves():
 
 @pytest.mark.slow
 def test_nothing_false_is_accepted():
-    count = fewer(100)
+    count = fewer(40)
     assert refusals(content_of(), random.Random(7), count, is_kept) > count / 2

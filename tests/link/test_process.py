@@ -13,11 +13,13 @@ from tests.export.flown import built, code_of, loop_of, same
 from tests.tiers import fewer, leading
 
 STEPS = 400
-LOOPS = ["lyapunov", "estimator", "sun", "yaw-steering", "wheel", "target from a table", "estimator on [sensor]", "l2",
-         "mission", "b_dot", "mpc", "ground-strip", "scan", "modes that watch"]  # fmt: skip
+LOOPS = ["lyapunov", "estimator", "wheel", "sun", "l2", "sliding", "yaw-steering", "target from a table", "directions",
+         "estimator on [sensor]", "mission", "b_dot", "mpc", "ground-strip", "scan", "modes that watch", "modal", "pd",
+         "hysteresis, axis", "pid, example 0, noise", "orbital target", "lqr, example 1, noise",
+         "a law that reads validity"]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", leading(LOOPS, 3))
+@pytest.mark.parametrize("name", leading(LOOPS, 5))
 def test_exported_laws_fly_the_bits_of_the_simulation(name, tmp_path):
     steps = fewer(STEPS, 2) if name != "mpc" else 12
     samples, carry = fly_by_process(built(tmp_path, code_of(name), "-O2"), loop_of(name), steps)

@@ -3,7 +3,6 @@ nothing that is not valid moves it."""
 
 import json
 import socket
-import subprocess
 import time
 
 import numpy as np
@@ -14,9 +13,8 @@ from starhold.link import server
 from starhold.link.plant import Ending, summary
 from starhold.link.protocol import Fault, Kind, Message, binary
 from starhold.report.timing import write_timing
-from tests.export.flown import built, code_of
-from tests.link.clients import OVER, Client, Dealer, connected, mutated, served
-from tests.tiers import fewer, leading
+from tests.link.clients import OVER, Client, Dealer, mutated, served
+from tests.tiers import fewer
 
 STEPS = 60
 
@@ -59,24 +57,6 @@ def test_lockstep_has_the_bits_of_a_simulation(over, text):
     assert not result.plant.faults
     assert len(result.plant.latencies) == STEPS + 1
     assert result.lines[0].startswith(f"Ended at step {STEPS} of {STEPS} (")
-
-
-@pytest.mark.parametrize("over", leading(["tcp", "serial"]))
-def test_exported_c_flies_an_orbit_with_the_bits_of_a_simulation(over, tmp_path):
-    """With an estimator and modes: the law as a program whose standard input and output are the line."""
-    scenario = short("cubesat-mission", fewer(11_400, 60))
-    flight = built(tmp_path, code_of("mission"), "-O2")
-    with served(scenario, over=over) as (address, results):
-        link = connected(address)
-        end = link.end if over == "serial" else link.fileno()
-        if over == "tcp":
-            link.settimeout(None)
-        assert subprocess.run([flight], stdin=end, stdout=end, check=False).returncode == 0
-        link.close()
-    result = results.get()
-    assert result.ending is Ending.FLOWN
-    assert not result.plant.faults
-    assert_same(sh.simulate(scenario), result.recording.dataset())
 
 
 def test_real_time_keeps_to_the_clock_and_counts_what_is_missing(tmp_path, monkeypatch):

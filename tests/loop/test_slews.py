@@ -2,7 +2,6 @@
 
 import math
 
-import erfa
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -11,6 +10,7 @@ from starhold.scenario.reading import parse
 from tests.making import built, flown
 from tests.missions import cubesat, mode
 from tests.refusals import refused
+from tests.sky import MARCH, to_sun
 
 INERTIA = np.array([0.05, 0.065, 0.025])
 PERIOD, RATE, ACCELERATION, TORQUE = 0.5, math.radians(0.8), math.radians(0.01), 5e-6
@@ -72,9 +72,7 @@ def test_a_mode_slews_from_the_attitude_of_the_craft_onto_a_target_that_moves(mo
 
 def test_a_mode_slews_around_the_sun():
     """A turn that leads an axis right through the Sun goes around it; the angle at every instant is by ERFA."""
-    days = sum(erfa.cal2jd(2026, 3, 5)) + 6.5 / 24.0 - 2451545.0
-    sun = erfa.pmat06(2451545.0, days) @ -erfa.epv00(2451545.0, days)[0]["p"]
-    sun /= np.linalg.norm(sun)
+    sun = to_sun(MARCH)
     held = Rotation.from_euler("ZYX", [-20, 35, 80], degrees=True)
     normal = np.cross(held.apply([0, 0, -1]), sun)
     angle = math.atan2(np.linalg.norm(normal), held.apply([0, 0, -1]) @ sun)

@@ -22,9 +22,9 @@ from starhold.studies.verification import by_flight
 from tests.making import built, flown
 from tests.missions import GUARDED, HEADS, SAFE, WATCHFUL, WHEELS, cubesat, mode
 from tests.refusals import refused
+from tests.sky import MARCH, to_sun
 
 FREE = GUARDED.replace('on_loss = "safe"\n', "")
-DAY = sum(erfa.cal2jd(2026, 3, 5)) + 6.5 / 24.0
 
 
 def between(test, level, more="", *tables):
@@ -48,27 +48,20 @@ def test_a_station_sees_the_craft_at_the_elevation_of_the_iau_s_routines():
         erfa.gd2gc(1, math.radians(-60.0), math.radians(52.0), 300.0),
         erfa.s2c(math.radians(-60.0), math.radians(52.0)),
     )
-    turns = erfa.gmst82(2451545.0, DAY - 2451545.0 + run["time"] / 86400.0)
+    turns = erfa.gmst82(2451545.0, MARCH + run["time"] / 86400.0)
     spun = np.array([erfa.rz(-turn, np.eye(3)) for turn in turns])
     ahead = run["position"] - spun @ site
     check(run, np.arcsin(np.sum(ahead * (spun @ up), axis=1) / np.linalg.norm(ahead, axis=1)), math.radians(-20.0), 1e-4)
 
 
-def towards_sun(run):
-    """The direction of the Sun from the Earth, in the mean axes of date."""
-    dates = DAY - 2451545.0 + run["time"] / 86400.0
-    return np.einsum("nij,nj->ni", erfa.pmat06(2451545.0, dates), -erfa.epv00(2451545.0, dates)[0]["p"])
-
-
 def test_sunlight_and_the_angle_to_the_sun_follow_the_ephemeris():
     run = between("sun_angle", "70 deg", ", axis = [0, 0, 2]", '[target]\nmode = "orbital"\n')
-    q, sun = run["attitude"], towards_sun(run)
+    q, sun = run["attitude"], to_sun(MARCH + run["time"] / 86400.0)
     down = Rotation.from_quat(q[:, [1, 2, 3, 0]]).apply([0.0, 0.0, 1.0])
-    angles = np.arccos(np.sum(down * sun, axis=1) / np.linalg.norm(sun, axis=1))
-    check(run, angles, math.radians(70.0), 1e-3)
+    check(run, np.arccos(np.sum(down * sun, axis=1)), math.radians(70.0), 1e-3)
 
     run = between("sunlight", 0.5)
-    along = np.sum(run["position"] * towards_sun(run), axis=1) / np.linalg.norm(towards_sun(run), axis=1)
+    along = np.sum(run["position"] * to_sun(MARCH + run["time"] / 86400.0), axis=1)
     # The edge of a cylinder is where the middle of the Sun is seen to set, to the angle by which light spreads.
     behind = np.sqrt(np.sum(run["position"] ** 2, axis=1) - along**2)
     check(run, np.where(along > 0.0, 1e4, behind - 6378137.0), 0.0, 5e3)

@@ -19,6 +19,7 @@ from starhold.parts.sun import EARTH, UNIT
 from starhold.scenario.building import build
 from tests.parts.fields import states
 from tests.parts.trackers import FILTER, FIRST, GYRO, errors, scenario
+from tests.sky import directions
 
 EPOCH = (2026.0, 3.0, 1.0, 6.0, 0.0, 0.0)
 ORBIT = {"position": [6.9e6, 0.0, 0.0], "velocity": [0.0, 5.0e3, 5.7e3], "epoch": "2026-03-01T06:00:00Z"}
@@ -30,10 +31,6 @@ def by_erfa(times):
     turn = erfa.pmat06(2451545.0, dates)
     pair = -erfa.epv00(2451545.0, dates)[0]["p"], erfa.moon98(2451545.0, dates)["p"]
     return [UNIT * np.einsum("nij,nj->ni", turn, place) for place in pair]
-
-
-def directions(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1)[..., None]
 
 
 def test_moon_against_erfa_over_a_century():

@@ -70,12 +70,15 @@ def of_dipole(random):
     return share
 
 
-def of_drag(random):
+def of_drag(random, thin=False):
+    """thin: air that thins so slowly and turns so fast that the orbit's highest place counts."""
     around, rows = orbit(random), plates(random, False)
     height = size(random, 1e5, 1e6)
     given = drag.Params(rows, size(random, 0.1, 5.0), size(random, 1e-16, 1e-8), height, size(random, 1e4, 1e7))
     given = given._replace(rotation=float(random.choice([0.0, 1.0, size(random, 0.1, 50.0)])))
-    if random.uniform() < 0.3:
+    if thin:
+        given = given._replace(scale_height=5e6, rotation=30.0)
+    elif random.uniform() < 0.3:
         heights = np.sort(random.uniform(0.0, 4e7, 5))
         logs = -30.0 - np.cumsum(random.uniform(0.1, 5.0, 5))
         table = [(h, f, float(np.exp(y + f / 100.0))) for h, y in zip(heights, logs, strict=True) for f in (70.0, 200.0)]
@@ -145,13 +148,16 @@ def of_table(random):
     return share
 
 
-def of_unloading(random):
+def of_unloading(random, weak=False):
+    """weak: so little is asked for that the rods are never on their limit."""
     around = orbit(random)
     limit = tuple(10.0 ** random.uniform(-3, 2, 3))
     given = magnetic_unloading.Params(
         size(random, 1e-6, 10.0), limit, int(random.integers(2)), epoch=epoch(random, 2025, 2029)
     )
     momentum, moment, wrong = size(random, 1e-6, 10.0), size(random, 1e-5, 10.0), size(random, 1e-12, 1e-3)
+    if weak:
+        given, momentum, wrong = given._replace(gain=1e-6, dipole_limit=(1e3,) * 3), size(random, 1e-3, 1.0), 1e-15
     given = given._replace(momentum=vector(random, float(random.choice([0.0, momentum]))))
     field = field_strength(magnetic_field.prepared(given.epoch, 1.0))
     bound = magnetic_unloading.bound(given, envelope(around, momentum=momentum, moment=moment, field_error=wrong))
@@ -165,24 +171,26 @@ def of_unloading(random):
         rate = np.exp(5.0 * (x[:, 8:9] - 1.0)) * along(x[:, 8:11])
         stored = momentum * along(x[:, 11:14]) - moment * rate
         wanted = -given.gain * (stored - np.array(given.momentum))
-        dipole = np.cross(seen, wanted) / np.maximum((seen**2).sum(axis=1), 1e-300)[:, None]
+        dipole, most = np.cross(seen, wanted) / np.maximum((seen**2).sum(axis=1), 1e-300)[:, None], given.dipole_limit
         if not given.limited:
-            dipole = dipole / np.maximum((np.abs(dipole) / limit).max(axis=1), 1.0)[:, None]
-        torque = np.cross(np.clip(dipole, -np.array(limit), limit), true)
+            dipole = dipole / np.maximum((np.abs(dipole) / most).max(axis=1), 1.0)[:, None]
+        torque = np.cross(np.clip(dipole, -np.array(most), most), true)
         return np.linalg.norm(torque, axis=1) / (bound.torque + bound.per_rate * np.linalg.norm(rate, axis=1))
 
     return share
 
 
-def of_wheels(random):
+def of_wheels(random, kinds=None):
+    """kinds: of friction, 1 for those that there are: viscous, Coulomb's, and that which sticks."""
     axes = [three_orthogonal(), pyramid(), along(random.normal(size=(5, 3)))][int(random.integers(3))]
     count = len(axes)
     inertia, limit = 10.0 ** random.uniform(-7, 0, count), 10.0 ** random.uniform(-4, 2, count)
-    viscous, coulomb, sticking = 10.0 ** random.uniform(-9, -2, (3, count)) * random.choice([0.0, 1.0], (3, 1))
+    chosen = random.choice([0.0, 1.0], (3, 1)) if kinds is None else np.array(kinds)[:, None]
+    viscous, coulomb, sticking = 10.0 ** random.uniform(-9, -2, (3, count)) * chosen
     try:
         given = wheels.make_wheels(axes, inertia.tolist(), 1.0, limit.tolist(), viscous.tolist(), coulomb.tolist())
     except ValueError:
-        return of_wheels(random)
+        return of_wheels(random, kinds)
     over = 10.0 ** random.uniform(-1, 2, count)
     if sticking.any():
         given = given._replace(sticking=tuple(sticking.tolist()), stribeck_speed=tuple(over.tolist()))
@@ -250,11 +258,15 @@ def of_tracker(random):
 ATTACKS = {
     "residual-dipole": of_dipole,
     "drag": of_drag,
+    "drag in thin air": lambda random: of_drag(random, thin=True),
     "solar-pressure": of_light,
     "constant-torque": of_constant,
     "torque-table": of_table,
     "magnetic-unloading": of_unloading,
+    "magnetic-unloading of little": lambda random: of_unloading(random, weak=True),
     "wheels": of_wheels,
+    "wheels with viscous friction": lambda random: of_wheels(random, (1.0, 0.0, 0.0)),
+    "wheels with Coulomb friction": lambda random: of_wheels(random, (0.0, 1.0, 0.0)),
     "magnetometer": of_magnetometer,
     "gyro": of_gyro,
     "star-tracker": of_tracker,
@@ -270,7 +282,7 @@ def saying():
 
 
 def test_every_part_that_says_a_bound_is_attacked():
-    assert saying() == {*ATTACKS, *QUIET}
+    assert saying() == {*(name.partition(" ")[0] for name in ATTACKS), *QUIET}
     assert gaussian.error(gaussian.examples()[0]) == Errors()
 
 
@@ -308,28 +320,31 @@ def off_of(part, given, count):
 
 
 PLACE = (7e6, 1e5, -2e5)
+MEASURED = magnetometer.Params(noise=3e-8, noise_density=1e-7, epoch=(2026.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+ABOUT = np.outer((0.0, 0.6, 0.8), (0.0, 0.6, 0.8))
 NOISY = {
-    "gaussian": (gaussian, gaussian.Params(2e-3, 3e-4)),
-    "gyro": (gyro, gyro.Params(noise=3e-5, bias_walk=2e-4)),
-    "star-tracker": (star_tracker, star_tracker.Params(2e-5, 9e-5, (0.0, 0.6, 0.8))),
-    "magnetometer": (
-        magnetometer,
-        magnetometer.Params(noise=3e-8, noise_density=1e-7, epoch=(2026.0, 1.0, 1.0, 0.0, 0.0, 0.0)),
+    "gaussian": (gaussian, gaussian.Params(2e-3, 3e-4), {"attitude": 2e-3, "rate": 3e-4}),
+    "gyro": (gyro, gyro.Params(noise=3e-5, bias_walk=2e-4), {"rate": 3e-5 / 0.1**0.5, "walk": 2e-4 * (0.1 / 3600.0) ** 0.5}),
+    "star-tracker": (
+        star_tracker,
+        star_tracker.Params(2e-5, 9e-5, (0.0, 1.2, 1.6)),
+        {"attitude": 2e-5 * np.eye(3) + 7e-5 * ABOUT},
     ),
+    "magnetometer": (magnetometer, MEASURED, {"field": np.hypot(3e-8, 1e-7 * (0.5 / 0.1) ** 0.5)}),
 }
+"""A sensor with numbers, and the roots of the covariances of what it shows every tenth of a second."""
 
 
 @pytest.mark.parametrize("name", NOISY)
-def test_noise_is_as_large_as_a_part_says(name):
+def test_noise_is_as_large_as_its_numbers_and_the_part_say(name):
     """Neither half of it nor twice as much: a claim for a share of orbits hangs on it."""
-    part, given = NOISY[name]
-    noise = part.noise(given, 0.1)
-    told = {"attitude": np.array(noise.attitude), "rate": noise.rate * np.eye(3), "field": noise.field * np.eye(3)}
-    told["walk"] = noise.walk * np.eye(3)
-    for kind, found in off_of(part, given, 3000).items():
-        root = told[kind]
-        # In units of what is told the covariance is that of independent numbers of size one.
-        units = np.linalg.solve(root, (found - found.mean(axis=0)).T)
+    part, given, roots = NOISY[name]
+    told, found = part.noise(given, 0.1), off_of(part, given, 3000)
+    for kind, root in roots.items():
+        root = root * np.eye(3) if np.ndim(root) == 0 else root
+        assert np.array(getattr(told, kind)) * (1.0 if kind == "attitude" else np.eye(3)) == pytest.approx(root, rel=1e-12)
+        # In units of it the covariance is that of independent numbers of size one.
+        units = np.linalg.solve(root, (found[kind] - found[kind].mean(axis=0)).T)
         assert np.allclose(np.cov(units), np.eye(3), atol=0.15), kind
 
 

@@ -11,13 +11,10 @@ from starhold.parts.epoch import DAY, days_of
 from starhold.parts.sun import UNIT
 from starhold.scenario.building import build
 from tests.refusals import refused
+from tests.sky import directions
 
 LATER = (0.0, 1.7, 30.0, 200.0, 364.0)
 """Days since the start."""
-
-
-def directions(vectors):
-    return vectors / np.linalg.norm(vectors, axis=-1)[..., None]
 
 
 def dates(epoch):

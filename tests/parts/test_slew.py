@@ -2,7 +2,6 @@
 
 import math
 
-import erfa
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,6 +12,7 @@ from starhold.studies.compare import record
 from tests.making import built
 from tests.missions import cubesat
 from tests.refusals import refused
+from tests.sky import MARCH, to_sun
 from tests.texts import toml
 from tests.tiers import WHOLE
 
@@ -82,15 +82,9 @@ TO_EDGE = (0.6200708393513185, 0.2580926042544815, 0.22539442072852267, 0.705760
 FROM_EDGE = (0.06739684609426541, -0.19202066765658107, -0.2843411559818094, 0.9368755708973284)
 
 
-def sun_of(day):
-    """The direction of the Sun, in the mean axes of date."""
-    seen = erfa.pmat06(2451545.0, day - 2451545.0) @ -erfa.epv00(2451545.0, day - 2451545.0)[0]["p"]
-    return seen / np.linalg.norm(seen)
-
-
 def test_a_path_leads_around_the_cone_about_the_sun():
     """The angle to the Sun, at every control step, by SciPy and ERFA."""
-    sun = sun_of(sum(erfa.cal2jd(2026, 3, 5)) + 6.5 / 24.0)
+    sun = to_sun(MARCH)
     epoch, around = (2026.0, 3.0, 5.0, 6.0, 30.0, 0.0), 0
     for turns in Rotation.random(200, rng=5).as_quat(scalar_first=True).reshape(100, 2, 4):
         params = slew.Params(tuple(turns[1]), RATE, ACCELERATION, tuple(turns[0]), 0.0, epoch=epoch)

@@ -28,7 +28,7 @@ from starhold.certification.unmodelled import (
     noisy_fields,
     samples_of,
 )
-from starhold.kernel.follower import LATE
+from starhold.kernel.follower import KNOWN, LATE
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, TOLD_TORQUE, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
@@ -161,10 +161,10 @@ def _late(numbers: Mapping[Any, Fraction], late: Late | None) -> Iterator[str]:
     if late is None:
         yield "its torque is not late"
         return
-    for name, x in (("kept", late.kept), ("mean", late.mean)):
-        least = stated.get(f"{name}.least")
-        off = least is not None and (not late.alike or least > fraction(x / LARGER))
-        if off or stated.get(name, 0) < fraction(x):
+    for name in KNOWN:
+        x, least = getattr(late, name), stated.get(f"{name}.least")
+        off = least is not None and (late.moment is None or least > fraction(x / LARGER))
+        if off or (name in stated and stated[name] < fraction(x)):
             yield "its torque is late otherwise"
     if isfinite(late.most) and ("most" not in stated or stated["most"] > fraction(late.most)):
         yield "its torque is late otherwise where it is further off"

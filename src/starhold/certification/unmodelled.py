@@ -115,7 +115,8 @@ def late_torque(loop: ClosedLoop) -> Late | None:
     if tell is None:
         return None
     late: Late = tell(actuators[0].params, loop.period)
-    return late._replace(kept=late.kept * LARGER, mean=late.mean * LARGER, most=late.most / LARGER)
+    moment = None if late.moment is None else late.moment * LARGER
+    return Late(late.kept * LARGER, late.mean * LARGER, late.most / LARGER, moment)
 
 
 def _moving(loop: ClosedLoop) -> list[Fitted]:

@@ -274,17 +274,13 @@ def _detumbling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "rates" not in n:
         return "the energy falls where the magnetic field turns in the body"
 
-    def most(name: str, unit: str, size: float = 1.0) -> str:
-        return listed([shown(size * x, unit, up=True) for x in n[name]])
-
-    falls = [f"{speed(m, True)} at up to {speed(rate)}" for m, rate in zip(n["turning"], n["rates"], strict=True)]
+    # Rates between, by how much the energy rises and for how long the field turns fast are in the certificate.
+    ends = sorted({0, len(n["rates"]) - 1})
+    falls = [f"{speed(n['turning'][k], True)} up to {speed(n['rates'][k])}" for k in ends]
     return (
-        f"the energy falls in each control period of {n['period']:.12g} s in which the field turns in the body by more than"
-        f" {listed(falls)}, and else rises by up to {most('rise', ' W')}; it turns by more than"
-        f" {most('often', '°/s', math.degrees(1.0))} for at most {most('spell', ' s')} and {most('shares', ' %', 100.0)} of"
-        f" the time; with a field of at least {shown(n['field'], ' T', True)} that changes by up to"
-        f" {shown(100.0 * n['field_change'], ' %')} a second, and torques from outside of up to"
-        f" {shown(n['torque'], ' N m')} and, across the field, {shown(n['torque_across'], ' N m')}"
+        f"energy falls in each control period in which the field turns in the body by over {', '.join(falls)}; field ≥"
+        f" {shown(n['field'], ' T', True)}, changing ≤ {shown(100.0 * n['field_change'], ' %')}/s; torques ≤"
+        f" {shown(n['torque'], ' N m')}, across it {shown(n['torque_across'], ' N m')}"
     )
 
 

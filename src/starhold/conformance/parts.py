@@ -283,13 +283,16 @@ def _follows_as_it_says(part: Part) -> None:
                 rate = module.rates(tuple(output), tuple(target), tuple(begun), PERIOD, numbers)
                 output = output + np.array(rate) * PERIOD / steps
                 sizes.append(float(np.linalg.norm(output - target) / np.linalg.norm(off)))
-            mean = float(np.mean(sizes[:-1]) + np.mean(sizes[1:])) / 2.0
+            between = (np.array(sizes[:-1]) + sizes[1:]) / 2.0
+            mean, moment = float(np.mean(between)), float(np.mean(between * (1.0 - (np.arange(steps) + 0.5) / steps)))
             require(bool(np.diff(sizes).max() < 1e-9), "it goes away from the command")
             for name, size, most in (("mean", mean, late.mean), ("kept", sizes[-1], late.kept)):
                 require(size <= most + 1e-3, f"{name} is {size:g}, larger than {most:g}")
-                require(not late.alike or size >= most - 1e-3, f"{name} is {size:g}, and not exactly {most:g}")
+                require(late.moment is None or size >= most - 1e-3, f"{name} is {size:g}, and not exactly {most:g}")
+            exact = late.moment is None or abs(moment - late.moment) <= 1e-3
+            require(exact, f"the mean by the time that is left is {moment:g}, and not {late.moment}")
             straight = np.linalg.norm(np.cross(output - target, off)) <= 1e-9 * float(off @ off)
-            require(not late.alike or bool(straight), "it comes nearer otherwise in each component")
+            require(late.moment is None or bool(straight), "it comes nearer otherwise in each component")
 
 
 def _moves_as_it_says(part: Part) -> None:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, date, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -25,7 +26,6 @@ from starhold.parts.epoch import OF_DATE, OF_J2000, Date, date_of, days_of, prec
 if TYPE_CHECKING:
     import xarray as xr
 
-Version = Literal["1.0", "2.0"]
 BODY = "SC_BODY"
 """The prefix of the names of spacecraft-fixed frames."""
 OFF_UNIT = 1e-3
@@ -39,6 +39,7 @@ SECOND = 10**9
 """Nanoseconds in a second; instants are counted in ns."""
 UNDATED = "2000-01-01T12:00:00"
 """The default epoch of a run."""
+WORD = "a word that a CCSDS message may hold"
 
 
 def from_date(attitudes: Any, epoch: Date, back: bool = False) -> NDArray[np.float64]:
@@ -82,15 +83,16 @@ def export_aem(
     flown: Any = open_run(run)
     if "attitude" not in flown:
         raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
-    times, attitudes = flown["time"].to_numpy(), flown["attitude"].to_numpy()
+    attitudes = flown["attitude"].to_numpy()
     if flown.attrs.get("frame") == OF_DATE and frame == OF_J2000:
         attitudes = from_date(attitudes, date_of(flown.attrs["epoch"]))
-    about: Any = {"object_name": object_name, "object_id": object_id, "frame": frame, "version": version}
-    try:
-        write_aem(Path(file), times, attitudes, epoch=flown.attrs.get("epoch", UNDATED) if epoch is None else epoch, **about)
-    except ValueError as error:
-        raise InputError("export aem", "", str(error), "a word that a CCSDS message may hold") from None
-    return Path(file)
+    if version not in ("1.0", "2.0"):
+        raise InputError("export aem", "", f"version {version}, which is neither 1.0 nor 2.0", WORD)
+    about = {"OBJECT_NAME": object_name, "OBJECT_ID": object_id, "REF_FRAME_A": frame, "REF_FRAME_B": f"{BODY}_1"}
+    kind = {"ATTITUDE_TYPE": "QUATERNION"}
+    if version == "1.0":
+        about["ATTITUDE_DIR"], kind["QUATERNION_TYPE"] = "A2B", "LAST"
+    return write_message("aem", version, flown, file, epoch, about, np.roll(attitudes, -1, axis=1), kind)
 
 
 def open_run(place: Any) -> Any:
@@ -107,59 +109,34 @@ def open_run(place: Any) -> Any:
         raise InputError(str(path), "", error.strerror or "no netCDF-4 file", "a run.nc, or the folder of one") from None
 
 
-def write_aem(
-    path: Path,
-    times: Any,
-    attitudes: Any,
-    *,
-    epoch: str,
-    object_name: str,
-    object_id: str,
-    frame: str = OF_J2000,
-    time_system: str = "UTC",
-    version: Version = "2.0",
-) -> None:
-    """Write attitudes as a message. times: (n,) s since the epoch, increasing; attitudes: (n, 4), scalar first, from the
-    frame to the body's axes. Raise ValueError if a word does not fit, InputError if the file cannot be written."""
-    stamps = stamps_of(times, epoch, (object_name, object_id, frame, time_system))
-    if version not in ("1.0", "2.0"):
-        raise ValueError(f"version {version}, which is neither 1.0 nor 2.0")
-    old = version == "1.0"
-    metadata = [
-        f"OBJECT_NAME = {object_name}",
-        f"OBJECT_ID = {object_id}",
-        f"REF_FRAME_A = {frame}",
-        f"REF_FRAME_B = {BODY}_1",
-        *["ATTITUDE_DIR = A2B"] * old,
-        f"TIME_SYSTEM = {time_system}",
-        f"START_TIME = {stamps[0]}",
-        f"STOP_TIME = {stamps[-1]}",
-        "ATTITUDE_TYPE = QUATERNION",
-        *["QUATERNION_TYPE = LAST"] * old,
+def write_message(
+    kind: str, version: str, run: Any, file: str | Path, epoch: str | None, about: dict[str, str], table: Any,
+    more: Mapping[str, str] = MappingProxyType({}),
+) -> Path:  # fmt: skip
+    """Write a message of one segment about the samples of a run, one row of the table each, and return its path. epoch: that
+    of the run if None; about, more: metadata before and after the time span. Raise InputError for fewer than two different
+    times, for a word that a message cannot contain, and for a file that cannot be written."""
+    try:
+        begun = instant_of(run.attrs.get("epoch", UNDATED) if epoch is None else epoch)
+        for text in about.values():
+            if not NAME.fullmatch(text):
+                raise ValueError(f"{text!r}, which is no line of printable ASCII")
+        stamps = [stamp_of(begun + round(float(time) * SECOND)) for time in run["time"].to_numpy()]
+        if len(set(stamps)) < max(len(stamps), 2):
+            raise ValueError("fewer than two different times")
+    except ValueError as error:
+        raise InputError(f"export {kind}", "", str(error), WORD) from None
+    span = {"TIME_SYSTEM": "UTC", "START_TIME": stamps[0], "STOP_TIME": stamps[-1]}
+    metadata = [f"{key} = {value}" for key, value in {**about, **span, **more}.items()]
+    rows = [
+        " ".join([stamp, *map(repr, row)])
+        for stamp, row in zip(stamps, np.asarray(table, dtype=float).tolist(), strict=True)
     ]
-    rows = zip(stamps, np.asarray(attitudes, dtype=float).tolist(), strict=True)
-    lines = [f"{stamp} {q1!r} {q2!r} {q3!r} {q0!r}" for stamp, (q0, q1, q2, q3) in rows]
-    write_message(path, f"CCSDS_AEM_VERS = {version}", metadata, ["DATA_START", *lines, "DATA_STOP"])
-
-
-def stamps_of(times: Any, epoch: str, words: Iterable[str]) -> list[str]:
-    """Return the epochs at times (s) since `epoch`. Raise ValueError for fewer than two different times, and for words that
-    a message cannot contain."""
-    begun = instant_of(epoch)
-    for text in words:
-        if not NAME.fullmatch(text):
-            raise ValueError(f"{text!r}, which is no line of printable ASCII")
-    stamps = [stamp_of(begun + round(float(time) * SECOND)) for time in times]
-    if len(set(stamps)) < max(len(stamps), 2):
-        raise ValueError("fewer than two different times")
-    return stamps
-
-
-def write_message(path: Path, version: str, metadata: list[str], rows: list[str]) -> None:
-    """Write a message of one segment. Raise InputError if the file cannot be written."""
+    rows = ["DATA_START", *rows, "DATA_STOP"] if kind == "aem" else rows
     made = [f"CREATION_DATE = {datetime.now(UTC):%Y-%m-%dT%H:%M:%S}", "ORIGINATOR = STARHOLD"]
-    lines = [version, *made, "", "META_START", *metadata, "META_STOP", "", *rows, ""]
-    write_text(path, "\n".join(lines))
+    head = [f"CCSDS_{kind.upper()}_VERS = {version}", *made, "", "META_START", *metadata, "META_STOP", ""]
+    write_text(Path(file), "\n".join([*head, *rows, ""]))
+    return Path(file)
 
 
 def read_message(file: str | Path, parse: Callable[[Path], _Message], kind: str) -> _Message:

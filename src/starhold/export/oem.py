@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import to_reference
 from starhold.errors import InputError, shortly
-from starhold.export.aem import SECOND, UNDATED, Lines, open_run, read_message, stamp_of, stamps_of, write_message
+from starhold.export.aem import SECOND, Lines, open_run, read_message, stamp_of, write_message
 from starhold.files import read_text
 from starhold.parts.epoch import OF_DATE, OF_J2000, date_of, days_of, precession
 
@@ -66,16 +66,8 @@ def export_oem(
         turn = precession(days_of(date_of(flown.attrs["epoch"])))
         halves: list[Any] = [to_reference(turn, tuple(half.T)) for half in (states[:, :3], states[:, 3:])]
         states = np.concatenate(halves).T
-    begun = flown.attrs.get("epoch", UNDATED) if epoch is None else epoch
     about = {"OBJECT_NAME": object_name, "OBJECT_ID": object_id, "CENTER_NAME": center, "REF_FRAME": frame}
-    try:
-        stamps = stamps_of(flown["time"].to_numpy(), begun, about.values())
-    except ValueError as error:
-        raise InputError("export oem", "", str(error), "a word that a CCSDS message may hold") from None
-    span = {"TIME_SYSTEM": "UTC", "START_TIME": stamps[0], "STOP_TIME": stamps[-1]}
-    rows = [" ".join([stamp, *map(repr, row)]) for stamp, row in zip(stamps, (states / 1e3).tolist(), strict=True)]
-    write_message(Path(file), "CCSDS_OEM_VERS = 2.0", [f"{key} = {value}" for key, value in (about | span).items()], rows)
-    return Path(file)
+    return write_message("oem", "2.0", flown, file, epoch, about, states / 1e3)
 
 
 @shortly

@@ -22,26 +22,26 @@ State = dict[str, Fraction]
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell is where its surfaces times their signs are not negative (0: where a surface vanishes)."""
+    """A cell is the set where its surfaces times their signs are nonnegative (sign 0: where a surface vanishes)."""
 
     signs: dict[Condition, int]
     rates: list[Poly]
     V: list[Poly]
 
     def on(self, surface: Condition, other: Cell) -> bool:
-        """Tell whether both cells meet on a surface only."""
+        """Tell whether the two cells meet only on a surface."""
         ends = [cell.signs.get(surface, 2) for cell in (self, other)]
         return 0 in ends or ends[0] == -ends[1]
 
     def holds(self, state: State) -> bool:
-        """Tell whether the cell holds a state, for some parameters that are left open."""
+        """Tell whether the cell contains a state, for some values of the free parameters."""
         sides = [(Poly(dict(surface)).at(state), sign) for surface, sign in self.signs.items()]
         return all(x.names or (x.number * sign >= 0 if sign else x.number == 0) for x, sign in sides)
 
 
 class System:
-    """x' = f(x) with functions V, cut into cells. Variables count from the equilibrium, if there is one, which the last
-    function is about."""
+    """x' = f(x) with functions V, divided into cells. Variables are relative to the equilibrium, if there is one; the last
+    function is about it."""
 
     def __init__(self, claim: Claim, *roles: str) -> None:
         self.claim, rates = claim, claim.programs["rates"]
@@ -118,18 +118,18 @@ class System:
 
     @cached_property
     def apart(self) -> list[tuple[int, ...]]:
-        """Return the cells that are told to be empty, and the pairs that are told not to meet."""
+        """Return the cells declared empty, and the pairs declared disjoint."""
         groups = [tuple(read_list(group)) for group in read_list(self.claim.evidence.get("apart") or [])]
         demand(all(len(group) in (1, 2) and self.are_cells(group) for group in groups), "there are no such cells")
         return groups
 
     def are_cells(self, places: Sequence[Any]) -> bool:
-        """Tell whether these are places of cells."""
+        """Tell whether these are indices of cells."""
         return all(type(k) is int and 0 <= k < len(self.all) for k in places)
 
     @cached_property
     def cells(self) -> list[int]:
-        """Return the places of the cells that are not empty."""
+        """Return the indices of the nonempty cells."""
         return [k for k in range(len(self.all)) if (k,) not in self.apart]
 
     def meet(self, i: int, j: int) -> bool:
@@ -137,7 +137,7 @@ class System:
         return (min(i, j), max(i, j)) not in self.apart
 
     def sound(self) -> Shown:
-        """Each function is one: it is the same where cells meet."""
+        """Show that each function is well defined: its values agree where cells meet."""
         for group in self.apart:
             yield f"apart {' '.join(map(str, group))}", self.sum(poly(-1), group)
         for i, j in combinations(self.cells, 2):
@@ -145,24 +145,24 @@ class System:
                 yield from self.equal(f"continuous {k} {i} {j}", p, (i, j))
 
     def equal(self, name: str, p: Poly, cells: Sequence[int]) -> Shown:
-        """p is zero where cells meet."""
+        """Show that p is zero where cells meet."""
         yield from ((f"{name} {sign:+d}", self.sum(p * sign, cells)) for sign in (1, -1) if p.terms)
 
     @property
     def origin(self) -> State:
-        """Return the equilibrium in place of the state."""
+        """Substitute the equilibrium for the state."""
         turned = [f"{f}.{x}" for x in self.angles for f in ("sin", "cos")]
         return dict.fromkeys((*self.names, *turned), Fraction(0))
 
     @property
     def around_point(self) -> list[Cell]:
-        """Return the cells that may hold the equilibrium."""
+        """Return the cells that may contain the equilibrium."""
         sides = (self.box.get(name, (-1, 1)) for name in self.names)
         demand(all(low < 0 < high for low, high in sides), "the equilibrium is not inside of the box")
         return [cell for cell in self.all if cell.holds(self.origin)]
 
     def state(self, place: str) -> tuple[Cell, State]:
-        """Return the state of the numbers place.x, and a cell that holds it; refuse one outside of the box."""
+        """Return the state with the numbers place.x, and a cell that contains it; refuse a state outside the box."""
         demand(not self.angles, "a state with an angle has no exact values")
         coordinates = {x: self.claim.numbers.coordinate(f"{place}.{x}") for x in (*self.names, *self.parameters)}
         state = {x: at - self.shift.get(x, 0) for x, at in coordinates.items()}
@@ -173,7 +173,7 @@ class System:
 
 
 def signs(guards: Guards) -> dict[Condition, int]:
-    """Return the side of each surface; p and -p are one surface, on which lies what has neither p > 0 nor -p > 0."""
+    """Return the side of each surface; p and -p are one surface, on which neither p > 0 nor -p > 0."""
     sides = dict[Condition, int]()
     for p, truth in sorted(guards):
         turn = 1 if p[0][1] > 0 else -1

@@ -1,4 +1,5 @@
-"""Checks certificates: python3 -I -S kernel.pyz certificate.json prints what is proved, or one line why it is refused."""
+"""Checks certificates: python3 -I -S kernel.pyz certificate.json prints what is proved, or the reason for a refusal in one
+line."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ UNREAD = "The programs were not compared with those of a scenario; what stands u
 
 @dataclass(frozen=True)
 class Proved:
-    """A claim that is proved, what it says, and the obligations that were checked."""
+    """A proved claim, its statement, and the obligations that were checked."""
 
     claim: Claim
     statement: Statement
@@ -25,18 +26,18 @@ class Proved:
 
     @property
     def shown(self) -> tuple[tuple[str, str], ...]:
-        """The names of the obligations, each with the name of its rule."""
+        """Return the names of the obligations, each with the name of its rule."""
         return tuple((name, type(obligation).__name__) for name, obligation in self.obligations)
 
 
 def check(text: str) -> list[Proved]:
-    """Return what a certificate proves; RefusedError where any of its claims is not proved."""
+    """Return what a certificate proves; RefusedError if any of its claims is not proved."""
     Account.open()
     return [prove(claim) for claim in read_certificate(text)]
 
 
 def prove(claim: Claim) -> Proved:
-    """Check each obligation of a claim's theorem; RefusedError where one is not shown."""
+    """Check each obligation of a claim's theorem; RefusedError if one is not shown."""
     Account.open()
     demand(claim.theorem in THEOREMS, "there is no such theorem")
     needed, shown = THEOREMS[claim.theorem](claim), list[tuple[str, Obligation]]()
@@ -60,7 +61,7 @@ def _if_valid(statement: Statement, claim: Claim) -> Statement:
 
 
 def main(arguments: list[str]) -> int:
-    """Print what a certificate proves; return 0, or 1 where it is refused."""
+    """Print what a certificate proves; return 0, or 1 if it is refused."""
     try:
         demand(len(arguments) == 1, "one certificate is checked at a time")
         with open(arguments[0], "rb") as file:
@@ -73,7 +74,7 @@ def main(arguments: list[str]) -> int:
 
 
 def written(proved: Proved) -> list[str]:
-    """Return the lines about a claim: what it says, and the programs that it says it of."""
+    """Return the lines about a claim: its statement, and the programs that it is about."""
     programs = proved.claim.programs.content.items()
     return [f"proved: {proved.statement.written()}", *(f"  {role} {program.digest}" for role, program in programs)]
 

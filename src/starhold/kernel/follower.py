@@ -2,28 +2,45 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
 from .near import Near
-from .numbers import Rows, beside, demand, norm, plus, reach, root, scalar, shortened, times, transpose, up
+from .numbers import Rows, added, beside, demand, norm, plus, reach, root, scalar, times, transpose, up
 from .polynomials import Poly, apply, minus, most, var
 from .reader import Reader
 from .reading import Numbers
-from .regions import ANGLE, AT_REST, RATE, SPEED, STATE, TURN, Behind, Radii, Sizes, Tube, felt, stretch, with_momentum
-from .sentences import below
+from .regions import (
+    ANGLE,
+    AT_REST,
+    RATE,
+    SPEED,
+    STATE,
+    TURN,
+    Behind,
+    Radii,
+    Sizes,
+    Tube,
+    felt,
+    stretch,
+    widened,
+    with_momentum,
+)
+from .sentences import above, below
 
 ZERO = Fraction(0)
 FIRST, REST = "|e", "|e rest"
 """Under which the sizes have those of a and b, into which e is divided of a torque that is late."""
 SPENT, SPARE = Fraction(1, 4), Fraction(1, 8)
 """The share of what is forgotten that pays for the work of what is late, and that which does for nothing."""
-PLACES, ROUNDS = 80, 40
-"""Binary places of the part of what is late that is linear in the state, and how often it is made more exact."""
 LATE = "late.torque."
 """How the names of its numbers begin."""
+KNOWN = "kept", "mean", "moment"
+"""What is told of how late a torque is all components of which near what is asked for alike: in the end of a period, in its
+mean, and in that by the time that is left."""
 WITHIN = f"{LATE}most"
 """How far the torque that acts may be off, of one that follows otherwise beyond."""
 
@@ -66,23 +83,11 @@ class Change:
     rest: Fraction
     kept: Fraction
 
-    def settled(self, tube: Tube, whole: bool, leant: Radii = AT_REST) -> Fraction:
-        """Return what b comes down to in a tube's region, or a + b."""
+    @property
+    def settled(self) -> Fraction:
+        """Return what b comes down to."""
         demand(self.kept < 1, "what is late is not forgotten")
-        if not whole:
-            return up(self.rest / (1 - self.kept))
-        return up((reached(self.M, tube, leant) + self.rest) / (1 - self.kept))
-
-
-@dataclass(frozen=True)
-class Steady:
-    """A torque that is late by e = f - Sx: f becomes kept f + |Mx| and what else changes, of which what is not linear in w
-    and q counts `off` times."""
-
-    S: Rows
-    M: Rows
-    off: list[Fraction]
-    kept: Fraction
+        return up(self.rest / (1 - self.kept))
 
 
 class Costs(NamedTuple):
@@ -108,35 +113,51 @@ class Follower(Reader):
     pull: list[Poly]
     bend: list[Poly]
     speeding: list[Poly]
-    slow: list[Poly]
-    soft: Fraction
-    leant: Radii
+    heeded: list[Poly]
+    beside: list[Poly]
+    leaning: list[Poly]
+    apart: Radii
+    swayed: Radii
     late: Late | None
+
+    @property
+    @abstractmethod
+    def away(self) -> Radii:
+        """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
 
     def follow(self, numbers: Numbers) -> Late | None:
         """Read how late the torque is, if it is."""
-        self.steady: Steady | None = None
+        # Of what nears what is asked for alike in all components how exactly it is known. What noise makes of the torque
+        # that acts, and what momentum makes of that; how large that of the linear motion is, and how far off it is at first.
+        self.inexact, self.drawn, self.applied, self.unsettled = list[Fraction](), AT_REST, ZERO, ZERO
         if f"{LATE}mean" not in numbers:
             return None
         late = Late(*(numbers[LATE + name] for name in ("kept", "mean", "weight", "begun", "rest")))
         demand(late.kept < 1 and 0 < late.mean <= 1 and late.weight > 0, "what is late never comes")
         self.step = plus(self.near.A, scalar(1, 6), -1)
         self.demanded = times(self.near.torque, self.step)
-        kept, mean = (numbers.get(f"{LATE}{name}.least") for name in ("kept", "mean"))
-        if kept is not None and mean is not None:
-            demand(kept <= late.kept and mean <= late.mean, "a torque is late otherwise than it is")
-            self.near, self.steady = steadied(self.near, self.h, late.kept, late.mean)
-            self.inexact = late.kept - kept, late.mean - mean
-            self.alike = mean, kept
+        if f"{LATE}moment" in numbers:
+            most, least = ([numbers[f"{LATE}{name}{end}"] for name in KNOWN] for end in ("", ".least"))
+            self.inexact = [x - y for x, y in zip(most, least, strict=True)]
+            demand(min(self.inexact) >= 0, "a torque is late otherwise than it is")
+            self.near, self.shares = self.near.lagging(self.h, *most), (most, least)
         # What the law's torque has beside that near its target.
         spun = [with_momentum(p - g) for p, g in zip(self.pull, self.bend, strict=True)]
         self.gyrating = spun, minus(self.speeding, spun)
-        self.beyond: list[Poly] = minus(self.loop.u, apply(self.near.torque, [var(name) for name in STATE]))
+        self.beyond = minus(self.loop.u, apply(self.near.torque, [var(name) for name in STATE]))
+        self.bare = minus(self.beyond, self.heeded)
         return late
 
-    def steady_part(self, tube: Tube) -> Fraction:
-        """Return how large the part of e is at most that is linear in the state."""
-        return reached(self.steady.S, tube, self.leant) if self.steady else ZERO
+    @property
+    def alike_in_words(self) -> str:
+        """How all components near what is asked for, if they do so alike."""
+        if not self.inexact:
+            return ""
+        (*_, moment), (kept, mean, least) = self.shares
+        return (
+            f", in all components alike, and by no less than {above(mean)} and {above(kept)} times, and by {above(least)} to"
+            f" {below(moment)} times in the mean by the time that is left"
+        )
 
     def of_level(self, c: Fraction) -> Sizes:
         """Return how far off the torque is where V + weight a^2 is no more than c."""
@@ -149,12 +170,12 @@ class Follower(Reader):
         size = sizes[REST] if rest else sizes[FIRST] + sizes[REST]
         return Behind(size, self.late.mean * size, self.late.moved * size)
 
-    def change_in(self, tube: Tube, whole: bool = False) -> Change | None:
-        """Return how much e changes in a period; whole: of e in place of a and b, less what is linear in the state."""
+    def change_in(self, tube: Tube) -> Change | None:
+        """Return how much e changes in a period, in sets of V."""
         if (late := self.late) is None:
             return None
         sizes, h, u, least = tube.sizes, self.h, self.loop.u, tube.region.least
-        near, steady = tube.region.sizes | {"v": 1 - least}, self.steady if whole else None
+        near = tube.region.sizes | {"v": 1 - least}
         bent, curved = (felt(self.beyond, letter, sizes) for letter in "wq")
         # The rates change by what is linear in the state and in the rate, with momentum; by what is not; by what is late;
         # and by how that changes the gyroscopic acceleration.
@@ -168,40 +189,93 @@ class Follower(Reader):
         demand((back := h * stretch(tube.bent)) < 1, "the period is too long for the rates")
         more = 1 / (1 - back)
         aside = h / 2 * sizes[SPEED] * root(2 * (1 - least + tube.turned))
-        pushed, error = self.pushed(sizes), self.misread(tube.region)[0]
-        ahead = h * self.light
         # How much it changes with how far rates and turn are from where they go linearly, and with where they go.
-        linear, turn = steady.off if steady else [stretch([row[part] for row in self.near.torque]) for part in (RATE, TURN)]
+        linear, turn = (stretch([row[part] for row in self.near.torque]) for part in (RATE, TURN))
         turned = turn + curved
         off = linear + turned * h / 2
         grown = off * back * more + bent * more
-        rest = 2 * (error + pushed["both"] - pushed["outside"] + self.stale(sizes, u))
+        rest = 2 * self.mistaken(tube) + self.renewed(sizes, u)
         rest += (off + grown) * drift + turned * aside
-        kept, behind = late.kept, (off + grown) * ahead
-        if steady:
-            # The linear part of the motion has what e does to it, up to what is not known of that.
-            e = tube.late.most
-            rest += self.inexact[0] * e + (off * self.inexact[1] + grown * late.mean) * ahead * e
-            # What is curved is not in that part at all: e turns the body by up to h^2 / 2.
-            rest += (turn + 4 * curved) * h * ahead / 8 * late.mean * e
-            # It is linear in x less where the slow torque holds the body, which moves by twice what it does in the mean.
-            rest += stretch([row[TURN] for row in steady.S]) * 2 * self.soft * self.stale(sizes, self.slow)
-            kept, behind = steady.kept, ZERO
-        rows = [(Fraction(1), steady.M if steady else self.demanded), (curved, Aq)]
-        M = together([*rows, (grown, Aw), ((off + grown) * gyrating, w)], [near[x] for x in STATE])
-        return Change(M, rest, kept + behind * late.mean)
+        rows = [(Fraction(1), self.demanded), (curved, Aq), (grown, Aw), ((off + grown) * gyrating, w)]
+        M = together(rows, [near[x] for x in STATE])
+        return Change(M, rest, late.kept + (off + grown) * h * self.light * late.mean)
 
-    def ends(self, tube: Tube) -> tuple[list[Fraction], Fraction]:
+    def mistaken(self, tube: Tube) -> Fraction:
+        """Return by how much the command is off for errors of what the law is told, and its own."""
+        pushed = self.pushed(tube.sizes)
+        return self.misread(tube.region)[0] + pushed["both"] - pushed["outside"]
+
+    def asks(self, radii: Radii) -> Fraction:
+        """Return how large the law's torque is at most that is linear in w and q of these sizes."""
+        return added([stretch([row[k] for row in self.near.torque]) * x for k, x in zip((RATE, TURN), radii, strict=True)])
+
+    def nears(self, tube: Tube) -> None:
+        """Begin the linear motion near the target with the torque that is asked for at one of its states."""
+        if not self.inexact:
+            return
+        sizes, heeded, (turned, rated) = tube.sizes, felt(self.heeded, "w", tube.sizes), self.noise
+        z = sizes[SPEED] + self.away[0], sizes[ANGLE] + self.away[1]
+        self.applied = self.asks(z) + heeded * z[0]
+        noisy = self.asks(self.swayed) + self.asks((rated, turned / 2)) + self.drawn[0]
+        self.unsettled = 4 * (self.applied + noisy + heeded * (z[0] + rated))
+
+    def entered(self, tube: Tube) -> Rows:
+        """Return the matrix of an ellipsoid that holds the linear motion in a tube's region as it begins."""
+        X = widened(tube.region.X, self.away)
+        if not self.inexact:
+            return X
+        none, torque = scalar(0), scalar(2 * self.applied**2)
+        return beside(plus(X, X), none + none) + beside(beside(none, none), torque)
+
+    def lateness(self, tube: Tube) -> tuple[Fraction, Fraction]:
+        """Return how late the torque is at most near the target once that of larger sets is forgotten: what of that the
+        linear motion has in it, and what not."""
+        assert self.late is not None
+        sizes, drift, turned = tube.sizes, norm(tube.end), tube.turned
+        pace, errors, changed = 1 / (1 - self.late.kept), 2 * self.mistaken(tube), self.renewed(sizes, self.loop.u)
+        linear = self.asks((drift, turned))
+        if not self.inexact:
+            curved = felt(self.beyond, "w", sizes) * drift + felt(self.beyond, "q", sizes) * turned
+            return ZERO, up((linear + curved + changed + errors) * pace)
+        # What is linear, and what momentum makes of the rates, changes within the motion; errors filtered are errors.
+        curved = felt(self.bare, "w", sizes) * drift + felt(self.bare, "q", sizes) * turned
+        spun, slow = (felt(self.heeded, "w", sizes) * drift, [with_momentum(p, "r") for p in self.loop.u])
+        rest = curved + self.renewed(sizes, minus(self.loop.u, slow)) + self.renewed(sizes, self.leaning)
+        rest += self.inexact[0] * tube.late.most
+        if any(self.apart):
+            rest += 2 * self.changes(sizes)["h"] / self.size("h") * self.drawn[1]
+        return up((linear + spun + self.renewed(sizes, slow)) * pace + errors), up(rest * pace)
+
+    def spun_late(self, tube: Tube, fast: Fraction) -> Fraction:
+        """Return how late is at most what the law's torque makes of momentum and a rate of up to `fast`, and of what
+        momentum makes of noise: no more than twice itself, and no more than it changes."""
+        if not (self.inexact and self.late):
+            return ZERO
+        changed = norm(tube.end) / (1 - self.late.kept) + 2 * self.swayed[0]
+        return felt(self.heeded, "w", tube.sizes) * (min(2 * fast, changed) + 2 * self.apart[0])
+
+    def paced(self, tube: Tube, pulled: Fraction, torque: Fraction | None = None) -> Fraction:
+        """Return how large the acceleration is in the mean of a period, of a linear motion for which as much is asked as
+        `pulled`, with a torque of no more than that, or as told."""
+        if not (self.inexact and pulled and self.late):
+            return pulled
+        acts = tube.region.sizes[REST] + stretch(self.loop.given) * pulled if torque is None else torque
+        return (1 - self.late.mean) * pulled + self.late.mean * self.light * acts
+
+    def ends(self, tube: Tube) -> tuple[list[Fraction], Fraction, Fraction]:
         """Return torques at the beginning and at the end of a period, and a turn, that do no less near the target than a
-        torque that is late."""
+        torque that is late; and one that is held and moves the rates, evenly, no less."""
         if (late := self.late) is None:
-            return [ZERO, ZERO], ZERO
-        linear, rest = (tube.region.sizes[x] for x in (FIRST, REST))
-        if not self.steady:
-            return [(linear + rest) * x for x in late.ends], ZERO
-        # Its linear part is in the motion, but for how early it acts; of the rest that alone is not known.
-        along = self.h * self.h * self.light / 8 * late.mean * (linear + rest)
-        return [self.inexact[1] * linear + rest * late.mean * x for x in (Fraction(3, 2), Fraction(1, 2))], along
+            return [ZERO, ZERO], ZERO, ZERO
+        rest, e = tube.region.sizes[REST], tube.late.most
+        if not self.inexact:
+            return [e * x for x in late.ends], ZERO, tube.late.moved
+        (_, mean, moment), (*_, least) = self.shares
+        _, uneven, further = self.inexact
+        # The rates are where the mean takes them, but for a share that is nothing at both ends and concave between.
+        curved = 4 * moment - 2 * mean + 3 * uneven
+        torques = [uneven * e + 2 * rest * x for x in (moment, mean - least)]
+        return torques, self.h**2 / 2 * self.light * (further + uneven / 2) * e, curved * e + late.moved * rest
 
     def paid(self, late: Late, change: Change, form: Rows, costs: Costs) -> tuple[Rows, Fraction, Fraction]:
         """Return what is left of a form where the fall of weight a^2 pays for what is late, what beside that adds to V, and
@@ -227,30 +301,3 @@ def together(parts: list[tuple[Fraction, Rows]], sizes: Sequence[Fraction]) -> R
         if weight
         for row in R
     ]
-
-
-def steadied(near: Near, h: Fraction, kept: Fraction, mean: Fraction) -> tuple[Near, Steady]:
-    """Return the linear motion near the target with the part of e in it that is linear in the state, of a torque that nears
-    what is asked for alike in all components; and what is left of e."""
-    T, begun = near.torque, plus(near.A, scalar(1, 6), -1)
-    by = [[c * x for x in row] for c in (h * mean, 3 * h * h / 8 * mean) for row in near.inverse]
-    part, step, left = [[ZERO] * 6] * 3, begun, times(T, begun)
-    for _ in range(ROUNDS):
-        # Towards an S with which M vanishes, as it does of a motion in which e follows the state.
-        part = shortened(plus(part, [[x / (1 - kept) for x in row] for row in left], -1), PLACES)
-        step = plus(begun, times(by, part), -1)
-        left = plus([[(1 - kept) * x for x in row] for row in part], times(plus(part, T, -1), step))
-    beyond = plus(part, T, -1)
-    off = [stretch([row[part] for row in beyond]) for part in (RATE, TURN)]
-    return near._replace(A=plus(step, scalar(1, 6))), Steady(part, left, off, kept + stretch(times(beyond, by)))
-
-
-def reached(M: Rows, tube: Tube, leant: Radii) -> Fraction:
-    """Return a bound of |Mx| in a tube's region, and where x is no further from it than told."""
-    sizes, X = tube.region.sizes, tube.region.X
-    # In three rows each: no eigenvalue of MXM' exceeds the largest sum of a row.
-    grams = (times(times(rows, X), transpose(rows)) for rows in (M[k : k + 3] for k in range(0, len(M), 3)))
-    by_ellipsoid = root(sum((max(sum(map(abs, row), ZERO) for row in gram) for gram in grams), ZERO))
-    parts = [stretch([row[k] for row in M]) for k in (RATE, TURN)]
-    by_sizes = sum((part * sizes[x] for part, x in zip(parts, (SPEED, ANGLE), strict=True)), ZERO)
-    return min(by_ellipsoid, by_sizes) + sum((part * x for part, x in zip(parts, leant, strict=True)), ZERO)

@@ -93,16 +93,12 @@ class Held(Follower):
         # What does not: that of momentum and the target's rate is slow, the rest by the first that it has of what comes from
         # outside.
         self.slow = [with_momentum(p, "r") for p in left]
+        self.leaning = [with_momentum(p, "r") for p in minus(self.beside, turning)]
         self.rigid = {x: [first(p, x) for p in minus(left, self.slow)] for x in ("e", "a", "h", "r")}
         self.near = near_target(loop, self.h)
         self.N, h = inverse(loop.given), self.h
         self.widths, self.light = [norm(row) for row in self.N], stretch(self.N)
         demand(self.off * self.light < 1, "the inertia is known too badly")
-        # What torques at the beginning and at the end of a period do, half of each if they are held, and what turns do.
-        ends = (
-            [[h / 2 * x for x in row] for row in self.N] + [[c * x for x in row] for row in self.N] for c in (h * h / 4, 0)
-        )
-        self.ways: list[Rows] = [*ends, scalar(0) + scalar(1)]
         # How large the slow torque is, how far a torque that lasts turns the body, and how far this one.
         self.lasting = felt(self.slow, "h", self.others) * self.size("h")
         stiff = [[-x for x in row[TURN]] for row in self.near.torque]
@@ -141,6 +137,10 @@ class Held(Follower):
         self.parted = minus(self.beside, turning), turning
         self.worked = [[dot(apply(self.felt, x), parts)] for parts in self.parted]
         self.late = self.follow(numbers)
+        # What torques at the beginning and at the end of a period do, half of each if they are held, and what turns do.
+        ways = [[[c * x for x in row] for c in (h / 2, turn) for row in self.N] for turn in (h * h / 4, ZERO)]
+        ways.append(scalar(0) + scalar(1))
+        self.ways = [rows + [[ZERO] * 3] * (len(self.near.A) - len(STATE)) for rows in ways]
         # 2 (1 - q0) >= |q|^2.
         self.under = self.form(self.s / 2)
         demand(definite(self.under), "V is not least on target")
@@ -326,6 +326,14 @@ class Held(Follower):
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
         return between(self.near, self.loop, self.size("h")) if self.loop.wheels else [self.near.A]
 
+    def sways(self, radii: list[Fraction]) -> None:
+        """Take in what noise adds near the target: rate, turn and the torque that acts, if it lags, and then what momentum
+        makes of these."""
+        count = len(self.near.A) // 3
+        (w, q, *torque), (faster, farther, *more) = radii[:count], radii[count:] or [ZERO] * count
+        self.swayed, self.apart = (w, q), (faster, farther)
+        self.drawn = (torque[0], more[0]) if torque else AT_REST
+
     @property
     def away(self) -> Radii:
         """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
@@ -347,10 +355,12 @@ class Held(Follower):
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         near = region.sizes | {"v": turn * turn}
         odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
+        odd += self.spun_late(tube, fast)
         # What noise adds has in it what momentum makes of it, but not what it makes of that.
         noisy = felt(self.heeded, "w", near) * self.noise[1] * self.light
-        drift = norm(self.astray(tube, self.lasting + tube.steady - tube.uneven))
-        drift += h * (pulled + self.pulled(self.apart) + noisy)
+        at_ends, along, uneven = self.ends(tube)
+        drift = norm(self.astray(tube, self.lasting + tube.steady - tube.uneven + tube.late.moved - uneven))
+        drift += h * (self.paced(tube, pulled) + self.paced(tube, self.pulled(self.apart), self.drawn[1]) + noisy)
         growing = "rh" + "e" * (self.gradual(tube.sizes) < 2 * self.size("e"))
         late = self.stale(tube.sizes, self.beside, letters=growing)
         steady = tube.uneven - self.lasting + tube.pushed - self.random + odd + tube.stale - late
@@ -366,7 +376,6 @@ class Held(Follower):
             change = 2 * self.changes(tube.sizes)["h"] / self.size("h")
             steady += change * self.apart[0] * stretch(self.loop.given) / h
             moved += change * (self.apart[1] + h / 4 * self.apart[0])
-        at_ends, along = self.ends(tube)
         sizes = steady + 2 * grown + at_ends[0], steady + 4 * grown + at_ends[1], rolled + moved + along
         return list(zip(self.ways, sizes, strict=True))
 

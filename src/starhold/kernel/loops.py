@@ -42,20 +42,20 @@ Wired: TypeAlias = Mapping[str, Poly]
 
 
 def wired(name: str, value: Sequence[Poly]) -> dict[str, Poly]:
-    """Return the inputs of a vector: name.0, name.1, ..."""
+    """Return the input names of a vector: name.0, name.1, ..."""
     return {f"{name}.{k}": part for k, part in enumerate(value)}
 
 
 def wired_matrix(name: str, value: Matrix) -> dict[str, Poly]:
-    """Return the inputs of a matrix: name.0.0, ..., and of a diagonal one name.0, name.1, name.2 too."""
+    """Return the input names of a matrix: name.0.0, ..., and for a diagonal one also name.0, name.1, name.2."""
     wires = {f"{name}.{i}.{k}": poly(x) for i, row in enumerate(value) for k, x in enumerate(row)}
     plain = all(poly(value[i][k]).terms == {} for i in AXES for k in AXES if i != k)
     return wires | ({f"{name}.{i}": poly(value[i][i]) for i in AXES} if plain else {})
 
 
 class Loop:
-    """A loop reads its programs over one ring. `told` names their inputs, beside what is wired to the one that is read;
-    `rates` has the derivatives that do not depend on the law, `driven` the variables of those that do."""
+    """A loop reads its programs over one ring. `told` names the inputs of its programs, besides those wired in a single
+    reading; `rates` has the derivatives that do not depend on the law, `driven` the variables of those that do."""
 
     inputs: Wired
     rates: Mapping[str, Poly]
@@ -65,8 +65,8 @@ class Loop:
         self.claim, self.ring = claim, ring
 
     def read(self, role: str, count: int, *tables: Wired) -> list[Piecewise]:
-        """Return the outputs of a program. Of its inputs only gains, numbers of the craft as the law knows it and as it is,
-        and the period are numbers, those of the subject."""
+        """Return the outputs of a program. Of its inputs only the gains, the numbers of the craft (true, and as the law
+        knows them) and the period are numbers, taken from the subject."""
         program, given = self.claim.programs[role], dict[str, Piecewise]()
         for name in program.inputs:
             wires = [table[name] for table in (self.inputs, *tables) if name in table]
@@ -80,15 +80,15 @@ class Loop:
         return [single(cases) for cases in self.read(role, count, *tables)]
 
     def slopes_along(self, p: Poly, acceleration: Sequence[Poly]) -> Poly:
-        """Return the derivative of a function of the state along the motion with an acceleration."""
+        """Return the time derivative of a function of the state under an acceleration."""
         rates = {**self.rates, **dict(zip(self.driven, acceleration, strict=True))}
         return total(p.slope(name) * rate for name, rate in rates.items())
 
 
 class AttitudeLoop(Loop):
-    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are. `near`:
-    such a J near the given one, J0: no entry is off by more than `tolerance` sqrt(J0_ii J0_kk). `quotients`: programs may
-    divide by the state, but not by quotients, and take no roots of it. `remembers`: the law may keep a memory."""
+    """A rigid body under a law. `any_inertia`: the entries of J are variables; the law's own numbers stay fixed. `near`:
+    such a J near the given J0, with each entry within `tolerance` sqrt(J0_ii J0_kk). `quotients`: programs may divide by the
+    state, but not by quotients, and take no roots of it. `remembers`: the law may have a memory."""
 
     driven = RATES
 
@@ -144,7 +144,7 @@ class AttitudeLoop(Loop):
 
     @cached_property
     def given(self) -> Rows:
-        """Return the inertia that the claim gives."""
+        """Return the inertia in the claim."""
         return [[self.claim.subject[f"body.inertia.{min(i, k)}.{max(i, k)}"] for k in AXES] for i in AXES]
 
     @cached_property
@@ -153,11 +153,12 @@ class AttitudeLoop(Loop):
         return self.claim.numbers["tolerance"] * sum(self.given[i][i] for i in AXES)
 
     def heaviest(self, x: Sequence[Poly]) -> list[Poly]:
-        """Return what is not negative for inertias near the given one, as x.Jx is no more than the most times |x|^2."""
+        """Return expressions that are nonnegative for inertias near the given one, because x.Jx is at most the largest
+        moment times |x|^2."""
         return [self.claim.numbers["inertia.most"] * dot(x, x) - dot(x, apply(self.J, x))] if self.near else []
 
     def shifted(self) -> list[Poly]:
-        """Return what is not negative for inertias near the given one, as |q0 w + w x q| <= |w|."""
+        """Return expressions that are nonnegative for inertias near the given one, because |q0 w + w x q| <= |w|."""
         if not self.near:
             return []
         w, vector = self.w, self.q[1:]
@@ -166,30 +167,30 @@ class AttitudeLoop(Loop):
 
     @cached_property
     def signs(self) -> list[str]:
-        """Return how the sign of the quaternion that is fed back is chosen anew, empty where it never is."""
+        """Return how the sign of the fed-back quaternion is updated; empty if it never changes."""
         words = [word for word in (SHORTEST, HYSTERESIS) if self.claim.taken.get(word)]
         demand(len(words) < 2, "the sign of the quaternion is chosen in two ways")
         return words
 
     @property
     def sign_assumed(self) -> str:
-        """Return what is assumed of that sign."""
+        """Return the assumption about that sign."""
         return "sign-at-once" if self.signs else "quaternion-as-fed"
 
     @property
     def untold(self) -> list[str]:
-        """Return what is assumed of a law that reads a torque from outside in a loop that has none."""
+        """Return the assumption about a law that reads an external torque in a loop that has none."""
         reads = any(name.startswith(f"{TOLD_TORQUE}.") for name in self.claim.programs["law"].inputs)
         return ["untold-torque"] * (reads and not self.outside)
 
     @property
     def divisors(self) -> dict[str, Poly]:
-        """Return the polynomials that variables are inverses of."""
+        """Return the polynomials whose inverses are variables."""
         return {name: Poly(dict(terms)) for terms, name in self.ring.inverses.items()}
 
     @property
     def assumed(self) -> list[str]:
-        """Return what is assumed of a body of this loop."""
+        """Return the assumptions about the body of this loop."""
         return [
             "rigid-body", "exact-measurement", "ideal-actuators",
             *(["inertia-near"] if self.near else [] if self.any_inertia else ["inertia-as-given"]),
@@ -200,7 +201,7 @@ class AttitudeLoop(Loop):
 
     @cached_property
     def law(self) -> list[Piecewise]:
-        """Return the torque that the law asks for, case by case; of one that remembers, without what its memory adds."""
+        """Return the torque demanded by the law, case by case; for a law with a memory, without what the memory adds."""
         if self.added is None:
             return self.read("law", 3)
         program = self.claim.programs["law"]
@@ -210,7 +211,7 @@ class AttitudeLoop(Loop):
 
     @cached_property
     def sides(self) -> Piecewise:
-        """Return the cases of the law's three torques together, which are continuous."""
+        """Return the joint cases of the law's three torques, which are continuous."""
         demand(all(a.agrees(b) for cases in self.law for a, b in combinations(cases, 2)), "the law's torque jumps")
         return joined(self.law)
 
@@ -221,7 +222,7 @@ class AttitudeLoop(Loop):
 
     @cached_property
     def u(self) -> list[Poly]:
-        """Return the torque of a law that does not switch."""
+        """Return the torque of a law without switching."""
         return [single(cases) for cases in self.law]
 
     def balance(self, u: Sequence[Poly]) -> list[Poly]:
@@ -231,23 +232,23 @@ class AttitudeLoop(Loop):
 
     @cached_property
     def acceleration(self) -> list[Poly]:
-        """Return w' of a law that does not switch."""
+        """Return w' under a law without switching."""
         return apply(self.J_inverse, self.balance(self.u))
 
     @cached_property
     def lyapunov(self) -> Poly:
-        """Return V, less what it is at rest on target."""
+        """Return V minus its value at rest on target."""
         (V,) = self.single("lyapunov", 1, wired_matrix("craft.inertia", self.J))
         self.autonomous([V])
         return V - V.at(self.on_target | self.still)
 
     def autonomous(self, parts: Sequence[Poly], kept: str = "") -> None:
-        """Refuse what depends on more than the state (and the inertia), and what is `kept`."""
+        """Refuse anything that depends on more than the state (and the inertia), and anything `kept`."""
         names = {name for part in parts for name in part.names if name[0] not in "qwj" + kept}
         demand(not names, f"the motion depends on more than the state: {', '.join(sorted(names))}")
 
     def expanded(self, p: Poly, rest: Mapping[str, int]) -> Poly:
-        """Return p with inverses to the first order around a point, where no divisor vanishes, used or not."""
+        """Return p with inverses expanded to first order around a point where no divisor vanishes, used or not."""
         for z, divisor in self.divisors.items():
             d = divisor.at(rest).number
             demand(d != 0, "a program divides by zero at rest")
@@ -255,7 +256,8 @@ class AttitudeLoop(Loop):
         return p
 
     def sound(self) -> Shown:
-        """The inertia is one, and the programs of the body and of its turning are the equations above."""
+        """Check that the inertia is valid and that the programs of the body's dynamics and kinematics are the equations
+        above."""
         inverses = list[Poly]()
         if self.any_inertia:
             columns = list(zip(*self.J_inverse, strict=True))
@@ -276,8 +278,8 @@ class AttitudeLoop(Loop):
 
 
 def apart(cases: Piecewise, added: Fraction) -> Poly:
-    """Return a polynomial in the middle of the two that are the values of cases without a memory in them, from which no case
-    is further than a number where it holds."""
+    """Return the mean of the two values that occur in cases without the memory; no case differs from it by more than the
+    given number where that case holds."""
     ends = {
         tuple(sorted(p.terms.items())): p
         for p in (case.value for case in cases)
@@ -292,7 +294,7 @@ def apart(cases: Piecewise, added: Fraction) -> Poly:
 
 
 def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:
-    """Return the one case that holds around rest, where none of its conditions is on its border."""
+    """Return the one case that holds in a neighbourhood of rest, with none of its conditions on its boundary."""
     sides = [[(Poly(dict(p)).at(rest).number, truth) for p, truth in case.guards] for case in cases]
     holds = [all(x != 0 and (x > 0) == truth for x, truth in guards) for guards in sides]
     demand(holds.count(True) == 1, "the law switches at rest")
@@ -300,5 +302,5 @@ def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:
 
 
 def slopes(parts: Sequence[Poly], names: Sequence[str], at: Mapping[str, Poly | Fraction | int] | None = None) -> Rows:
-    """Return the derivatives with respect to variables, at a point where one is told."""
+    """Return the derivatives with respect to variables, at a point if one is given."""
     return [[(one.at(at) if at else one).number for one in map(p.slope, names)] for p in parts]

@@ -14,7 +14,7 @@ from .regions import STATE, with_momentum
 
 CHANGE = "told.change", "told.change.per.rate"
 """How fast the torque changes that the law is told, per second, and more for each rad that the body turns."""
-MOMENTA = ("h1", "h2", "h3")
+MOMENTA, ZERO = ("h1", "h2", "h3"), Fraction(0)
 HALF_ROOT = Fraction(7072, 10000)
 """At least the root of 1/2."""
 AROUND = [
@@ -25,20 +25,41 @@ AROUND = [
 
 
 class Near(NamedTuple):
-    """A loop near its target: the law's torque and the acceleration as matrices on (w, q), and A and B such that samples are
-    followed by Ax + Bu, with a torque u that is held beside the law's; what one does that grows to uh; J^-1."""
+    """A loop near its target: the law's torque and the acceleration as matrices on (w, q); A, B and C = `commanded` so that
+    samples of x = (w, q), or of (w, q, torque) with a torque that lags, are followed by Ax + Bu + Cv, with a torque u held
+    beside the law's, and v beside what the law asks for; what a u does that grows to uh; the acceleration in the mean of a
+    period as matrices on x and on v; J^-1."""
 
     torque: Rows
     rates: Rows
     A: Rows
     B: Rows
+    commanded: Rows
     grown: Rows
+    mean: Rows
+    eased: Rows
     inverse: Rows
 
     def spun(self, law: Rows, body: Rows) -> Rows:
         """Return what the law's torque and the body's add to A that are these matrices times the rates."""
-        both = times(self.B, beside(plus(law, body), scalar(0)))
-        return plus(both, times(self.grown, times(body, self.rates)))
+        both = plus(times(self.commanded, law), times(self.B, body))
+        return plus([row + [ZERO] * (len(self.A) - 3) for row in both], times(self.grown, times(body, self.mean)))
+
+    def lagging(self, h: Fraction, kept: Fraction, mean: Fraction, moment: Fraction) -> Near:
+        """Return the loop with a torque that is off from what is asked for by so much in the end of a period and in its
+        mean, for each unit at first: it is one more vector of the state. moment: in the mean by the time that is left."""
+        N, T, none = self.inverse, self.torque, [[ZERO] * 3 for _ in AXES]
+        off = [[c * x for x in row] for c in (h * mean, h * h / 2 * moment) for row in N]
+        commanded, acts = plus(self.B, off, -1), 1 - mean
+        late = beside([[(1 - kept) * x for x in row] for row in T], scalar(kept))
+        return self._replace(
+            A=beside(plus(self.A, times(off, T), -1), off) + late,
+            B=self.B + none,
+            commanded=commanded + scalar(1 - kept),
+            grown=self.grown + none,
+            mean=beside([[acts * x for x in row] for row in self.rates], [[mean * x for x in row] for row in N]),
+            eased=[[acts * x for x in row] for row in N],
+        )
 
 
 def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
@@ -48,7 +69,7 @@ def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
     rates = times(N, torque)
     A = over_period([[-x for x in row] for row in rates], h)
     B, grown = ([[c * x for x in row] for c in both for row in N] for both in ((h, h * h / 4), (h * h / 2, h**3 / 12)))
-    return Near(torque, rates, A, B, grown, N)
+    return Near(torque, rates, A, B, B, grown, rates, N, N)
 
 
 def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:

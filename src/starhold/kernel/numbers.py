@@ -24,31 +24,31 @@ class RefusedError(Exception):
 
 
 def demand(truth: bool, otherwise: str) -> None:
-    """Refuse what is not so."""
+    """Refuse unless the condition holds."""
     if not truth:
         raise RefusedError(otherwise)
 
 
 class Account:
-    """The work that is left. It is counted and not timed, so that a certificate is refused on every machine or on none."""
+    """The remaining work. It is counted instead of timed, so that a certificate is refused on every machine or on none."""
 
     left = WORK
 
     @classmethod
     def open(cls) -> None:
-        """Begin a claim."""
+        """Begin the account of a claim."""
         cls.left = WORK
 
     @classmethod
     def spend(cls, operations: int, bits: int = 64) -> None:
-        """Pay for operations on numbers of so many bits before they are done."""
+        """Charge for operations on numbers of so many bits before they are done."""
         demand(bits <= LONGEST, "a number becomes too long")
         cls.left -= operations * (2 + bits // 64)
         demand(cls.left >= 0, "the check takes too much work")
 
 
 def longest(numbers: Iterable[Fraction]) -> int:
-    """Return the bits of the longest of some numbers."""
+    """Return the bit length of the longest of some numbers."""
     return max((x.numerator.bit_length() + x.denominator.bit_length() for x in numbers), default=0)
 
 
@@ -68,7 +68,7 @@ def rational(given: Any) -> Fraction:
 
 
 def read_list(given: Any, count: int | None = None) -> list[Any]:
-    """Read a list, of so many entries if that is told."""
+    """Read a list, of a given length if one is stated."""
     demand(isinstance(given, list), "evidence is not a list")
     entries = cast(list[Any], given)
     demand(count is None or len(entries) == count, "a list has another length")
@@ -76,7 +76,7 @@ def read_list(given: Any, count: int | None = None) -> list[Any]:
 
 
 def read_dict(given: Any, most: int) -> dict[str, Any]:
-    """Read a table of no more than so many entries."""
+    """Read a table with at most so many entries."""
     demand(isinstance(given, dict), "evidence is not a table")
     entries = cast(dict[str, Any], given)
     demand(len(entries) <= most, "a table is too long")
@@ -84,7 +84,7 @@ def read_dict(given: Any, most: int) -> dict[str, Any]:
 
 
 def read_table(given: Any, *keys: str) -> list[Any]:
-    """Read the entries of a table that has these keys and no other."""
+    """Read the entries of a table with exactly these keys."""
     entries = read_dict(given, len(keys))
     demand(set(entries) == set(keys), f"a table has other keys than {', '.join(keys)}")
     return [entries[key] for key in keys]
@@ -96,20 +96,20 @@ def matrix(given: Any, rows: int, columns: int) -> Rows:
 
 
 def whole(numbers: Sequence[Fraction | int]) -> tuple[list[int], int]:
-    """Return whole numbers and their common denominator."""
+    """Return integers and their common denominator."""
     below = lcm(*[x.denominator for x in numbers])
     return [x.numerator * (below // x.denominator) if below > 1 else x.numerator for x in numbers], below
 
 
 def added(numbers: Sequence[Fraction]) -> Fraction:
-    """Return a sum, reduced once."""
+    """Return a sum, reduced to lowest terms once."""
     upper, below = whole(numbers)
     return Fraction(sum(upper), below)
 
 
 def surely_definite(a: Rows) -> bool:
-    """Tell whether a symmetric matrix, its diagonal scaled to about 2^128, is found to be LL' + R with whole numbers in L,
-    and in R less than 2^65 beside a diagonal of 2^80 or more: it is positive definite then."""
+    """Tell whether a symmetric matrix, scaled so that its diagonal is about 2^128, is found to be LL' + R with integers in L
+    and with entries below 2^65 in R beside a diagonal of at least 2^80: it is then positive definite."""
     if any(row[k] <= 0 for k, row in enumerate(a)):
         return False
     Account.spend(len(a) ** 3 // 6, 128)
@@ -132,9 +132,9 @@ def surely_definite(a: Rows) -> bool:
 
 
 def definite(a: Rows, strictly: bool = True) -> bool:
-    """Tell whether a matrix is symmetric and positive definite (not strictly: nowhere negative). Where it is not so by far,
-    elimination in whole numbers (Bareiss) decides: the pivots are the leading minors of the matrix without the rows of zeros
-    that are met."""
+    """Tell whether a matrix is symmetric and positive definite (if not strict: positive semidefinite). If it is not clearly
+    so, fraction-free elimination (Bareiss) decides: the pivots are the leading minors of the matrix without its zero rows.
+    """
     demand(all(len(row) == len(a) for row in a), "a matrix is not square")
     demand(a == transpose(a), "a matrix is not symmetric")
     if surely_definite(a):
@@ -156,12 +156,12 @@ def definite(a: Rows, strictly: bool = True) -> bool:
 
 
 def shortened(a: Rows, places: int) -> Rows:
-    """Return a matrix with so many binary places, each entry rounded down."""
+    """Return a matrix rounded down to a number of binary places."""
     return [[Fraction((x.numerator << places) // x.denominator, 1 << places) for x in row] for row in a]
 
 
 def inverse(a: Rows) -> Rows:
-    """Invert a positive definite matrix exactly, by elimination without exchanges."""
+    """Invert a positive definite matrix exactly, by elimination without pivoting."""
     count = len(a)
     rest = [[*row, *unit] for row, unit in zip(a, scalar(1, count), strict=True)]
     for k in range(count):
@@ -201,12 +201,12 @@ def scalar(c: Fraction | int, count: int = 3) -> Rows:
 
 
 def beside(a: Rows, b: Rows) -> Rows:
-    """Return a matrix with the columns of both."""
+    """Return the matrix with the columns of both."""
     return [[*s, *t] for s, t in zip(a, b, strict=True)]
 
 
 def cosine_below(angle: Fraction) -> Fraction:
-    """Return a number not above the cosine of an angle from 0 to 3: its alternating series, ended after a negative term."""
+    """Return a lower bound of the cosine of an angle from 0 to 3: its alternating series, cut after a negative term."""
     demand(0 <= angle <= 3, "an angle is not between 0 and 3")
     Account.spend(80, 40 * longest([angle]))
     total, term = Fraction(0), Fraction(1)
@@ -216,12 +216,12 @@ def cosine_below(angle: Fraction) -> Fraction:
 
 
 def cosine_above(angle: Fraction) -> Fraction:
-    """Return a number not below the cosine of an angle from 0 to 3: the same series and its next term."""
+    """Return an upper bound of the cosine of an angle from 0 to 3: the same series with its next term."""
     return cosine_below(angle) + angle**48 / factorial(48)
 
 
 def root(x: Fraction) -> Fraction:
-    """Return a short number that is not below the square root of a number that is not negative, and hardly above it."""
+    """Return a short, tight upper bound of the square root of a nonnegative number."""
     demand(x >= 0, "a root is of a negative number")
     Account.spend(4, longest([x]))
     places = 64 + max(0, x.denominator.bit_length() - x.numerator.bit_length()) // 2
@@ -229,19 +229,19 @@ def root(x: Fraction) -> Fraction:
 
 
 def up(x: Fraction) -> Fraction:
-    """Return a short number that is not below a number, and hardly above it."""
+    """Return a short, tight upper bound of a number."""
     Account.spend(2, longest([x]))
     places = 64 + max(0, x.denominator.bit_length() - x.numerator.bit_length())
     return Fraction(-((-x.numerator << places) // x.denominator), 1 << places)
 
 
 def norm(v: Iterable[Fraction]) -> Fraction:
-    """Return a number that is not below the Euclidean norm, and hardly above it."""
+    """Return a tight upper bound of the Euclidean norm."""
     numbers, below = whole([*v])
     return root(Fraction(sum(x * x for x in numbers), below * below))
 
 
 def reach(a: Rows, v: Sequence[Fraction]) -> list[Fraction]:
-    """Return how large a matrix makes a vector whose components are no larger than those of v."""
+    """Return a bound of the image, by a matrix, of vectors whose components do not exceed those of v."""
     (sizes, under), rows = whole(v), list(map(whole, a))
     return [Fraction(sum(abs(x) * y for x, y in zip(row, sizes, strict=True)), below * under) for row, below in rows]

@@ -1,8 +1,9 @@
-"""Laws that ask for the first of the moves that cost least over a horizon, near the moves that do without limits.
+"""Laws that apply the first of the moves of least cost over a horizon, near the moves that are optimal without limits.
 
-A plan is of moves v_k, k < N, for the motion linearised about the rate w that the law is told, with gravity's stiffness:
-x_k+1 = A(w) x_k + B(w) v_k. Half its cost is half of the sum of x.Qx + v.Rv and, after the last move, x.Px. Where the best
-moves of all keep within the limits they are the best within the limits, as R > 0 and Q, P >= 0. Docs/kernel.md, 10.
+A plan consists of moves v_k, k < N, for the motion linearised about the rate w given to the law, with the stiffness of the
+gravity gradient: x_k+1 = A(w) x_k + B(w) v_k. Half its cost is half of the sum of x.Qx + v.Rv and, after the last move,
+x.Px. If the unconstrained optimum keeps within the limits, it is also the optimum within the limits, because R > 0 and Q, P
+>= 0. Docs/kernel.md, 10.
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ Whole: TypeAlias = list[list[int]]
 
 
 class Expansion(NamedTuple):
-    """A matrix that depends on a rate w, |w| <= W: the sum of its parts, in whole numbers of the last place, times products
-    of components of w, and a rest of a norm of no more than fixed + beyond |w|^(ORDER + 1)."""
+    """A matrix that depends on a rate w, |w| <= W: the sum of its parts, integers in units of the last place, times products
+    of components of w, and a remainder with a norm of at most fixed + beyond |w|^(ORDER + 1)."""
 
     parts: dict[tuple[int, ...], Whole]
     sizes: list[Fraction]
@@ -73,7 +74,7 @@ class Expansion(NamedTuple):
 
 
 def expansion(parts: dict[tuple[int, ...], Whole], fixed: Fraction, beyond: Fraction, W: Fraction) -> Expansion:
-    """Return an expansion of parts that are rounded down, of no more than 36 entries: |w1| + |w2| + |w3| <= 2 |w|."""
+    """Return an expansion with its parts rounded down, of at most 36 entries: |w1| + |w2| + |w3| <= 2 |w|."""
     sizes = list[Fraction]()
     for n in range(ORDER + 1):
         alike = [part for key, part in parts.items() if len(key) == n]
@@ -86,7 +87,7 @@ def expansion(parts: dict[tuple[int, ...], Whole], fixed: Fraction, beyond: Frac
 
 
 def rounded(parts: Sequence[Rows], W: Fraction) -> Expansion:
-    """Return the sum of matrices times 1, w1, w2, w3, as far as there are so many."""
+    """Return the sum of matrices times 1, w1, w2, w3, as many as are given."""
     keys = zip(KEYS, parts, strict=False)
     return expansion(
         {key: [[x.numerator * (1 << PLACES) // x.denominator for x in row] for row in part] for key, part in keys},
@@ -105,7 +106,7 @@ def added(a: Expansion, b: Expansion, W: Fraction) -> Expansion:
 
 
 def include(parts: dict[tuple[int, ...], Whole], key: tuple[int, ...], part: Whole) -> None:
-    """Add a matrix to the one of this product of components, if there is one."""
+    """Add a matrix to the part of this product of components, if there is one."""
     there = parts.get(key)
     parts[key] = (
         part if there is None else [[x + y for x, y in zip(s, t, strict=True)] for s, t in zip(there, part, strict=True)]
@@ -139,9 +140,9 @@ def diagonal(entries: Sequence[Fraction]) -> Rows:
 def sampled(
     J: Rows, h: Fraction, units: Sequence[Fraction], stiffness: Fraction, W: Fraction
 ) -> tuple[Expansion, Expansion]:
-    """Return A and B of (w, q) in units: e^M, and the mean of e^Mt for 0 <= t <= 1 times what a torque does, with M = M0
-    + w1 M1 + w2 M2 + w3 M3 + what gravity does. As M0^2 = 0, powers beyond 2 ORDER + 1 have nothing of the orders that are
-    known; what is of higher ones, or of gravity, is no more than what norms make of it."""
+    """Return A and B of (w, q) in units: e^M, and the mean of e^Mt for 0 <= t <= 1 times the effect of a torque, with M = M0
+    + w1 M1 + w2 M2 + w3 M3 + the effect of gravity. Because M0^2 = 0, powers beyond 2 ORDER + 1 contain none of the known
+    orders; higher orders and gravity are bounded by norms."""
     N, none, S, back = inverse(J), scalar(0), diagonal(units), diagonal([1 / x for x in units])
 
     def seen(ww: Rows, qw: Rows, qq: Rows) -> Rows:
@@ -174,15 +175,15 @@ def sampled(
 
 
 def divided(a: Expansion, n: int, W: Fraction) -> Expansion:
-    """Return a share."""
+    """Return a fraction of the expansion."""
     return expansion(
         {key: [[x // n for x in row] for row in part] for key, part in a.parts.items()}, a.fixed / n, a.beyond / n, W
     )
 
 
 class Plan:
-    """The moves of a claim, linear in (w, q) and nearly the best ones, and how far from these they are, all together: no
-    more than the sum of missed[n] |w|^n times the norm of (w, q) in units."""
+    """The moves of a claim, linear in (w, q) and nearly optimal, and their total distance from the optimum: at most the sum
+    of missed[n] |w|^n times the norm of (w, q) in units."""
 
     def __init__(self, loop: AttitudeLoop) -> None:
         numbers, subject, self.loop = loop.claim.numbers, loop.claim.subject, loop
@@ -209,8 +210,9 @@ class Plan:
         return [total([p, *(w * part[i] for w, part in zip(turned, others, strict=True))]) for i, p in enumerate(still_part)]
 
     def _missed(self) -> list[Fraction]:
-        """Return what is missed of each order. The gradient g of half the cost at the moves bounds how far the best ones
-        are: R weighs both, as |R^1/2 d| <= |R^-1/2 g|; and so does by how much a plan may cost more than the best one."""
+        """Return the distance in each order. The gradient g of half the cost at the moves bounds the distance to the
+        optimum: R weighs both, as |R^1/2 d| <= |R^-1/2 g|; and so does the amount by which the cost of a plan may exceed the
+        optimum."""
         subject, W, back = self.loop.claim.subject, self.fastest, self.back
         state, command = ([subject[f"plan.{name}.{k}"] for k in range(n)] for name, n in (("state", 6), ("command", 3)))
         end = [[subject[f"plan.end.{min(i, k)}.{max(i, k)}"] for k in range(6)] for i in range(6)]
@@ -236,7 +238,7 @@ class Plan:
         return [base + root(2 * self.gap * cost / least), *others]
 
     def error(self, sizes: Sizes) -> Fraction:
-        """Return how far the torque is at most from that of the moves, at sizes of what the law is told."""
+        """Return a bound of the difference between the torque and the moves, for given sizes of the inputs of the law."""
         w = sizes[SPEED]
         demand(w <= self.fastest, "rates exceed those of the plan")
         return sum((c * w**n for n, c in enumerate(self.missed)), ZERO) * self._length(sizes)
@@ -245,8 +247,8 @@ class Plan:
         return norm(max(self.units[part]) * sizes[name] for part, name in ((RATE, SPEED), (TURN, ANGLE)))
 
     def keeps(self, region: Region, misread: Radii, sizes: Sizes) -> Part[tuple[str, list[Fraction]]]:
-        """No move of the best plan is beyond the limits; returns how large its torques are about each axis. misread: how far
-        w and q of what the law is told are off at most; sizes: of what it is told in the region."""
+        """Check that no move of the optimal plan exceeds the limits; return its largest torques about each axis. misread:
+        the largest errors of w and q as given to the law; sizes: those of w and q in the region."""
         demand(self.limit is None or self.longest is None, "moves are limited in two ways")
         others, wide = self.error(sizes), sizes[SPEED] * self._length(sizes)
         highest = [ZERO] * 3

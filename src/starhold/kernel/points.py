@@ -1,7 +1,7 @@
 """The loop of a craft near a libration point, wired from programs by the kernel.
 
-x are places and v velocities in axes that turn with the two bodies: x' = v, v' = field(x, v) + u, with the law's control u.
-Roots and quotients by the state are variables, the same wherever the same is asked for.
+x are positions and v velocities in axes that rotate with the two bodies: x' = v, v' = field(x, v) + u, with the law's
+control u. Roots and quotients of the state are variables, shared by equal expressions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ STATE = ("x1", "x2", "x3", "v1", "v2", "v3")
 
 
 class PointLoop(Loop):
-    """A craft near a libration point under a law; `sides` are the cases of the law, which together are all states."""
+    """A craft near a libration point under a law; `sides` are the cases of the law, which together cover all states."""
 
     ring: Asking
     driven = STATE[3:]
@@ -35,7 +35,7 @@ class PointLoop(Loop):
 
     @cached_property
     def sides(self) -> Piecewise:
-        """Return the cases of the law's three outputs together."""
+        """Return the joint cases of the law's three outputs."""
         return joined(self.read("law", 3))
 
     def acceleration(self, side: Case) -> list[Poly]:
@@ -43,20 +43,20 @@ class PointLoop(Loop):
         return [a + u for a, u in zip(self.field, side.value, strict=True)]
 
     def depends_on(self, side: Case) -> set[str]:
-        """Return the variables of the acceleration."""
+        """Return the variables in the acceleration."""
         return {name for p in self.acceleration(side) for name in p.names}
 
     @property
     def assumed(self) -> list[str]:
-        """Return what every claim about such a loop assumes."""
+        """Return the assumptions of every claim about such a loop."""
         linear = all(len(m) <= 1 and {*m} <= {*STATE} for p in self.field for m in p.terms)
         field = "linear-field" if linear else "whole-field"
         return [field, "circling-bodies", "exact-place", "continuous-control"]
 
     @property
     def bodies(self) -> list[str]:
-        """Return what is assumed where the equations have no value everywhere: they take roots of forms that are nowhere
-        negative, and divide by distances, which are zero at the bodies alone."""
+        """Return the assumptions if the equations are not defined everywhere: they take roots of nonnegative forms and
+        divide by distances, which are zero only at the bodies."""
         self.divides_by_distances()
         one = [poly(1), *self.x, *self.v]
         for p in self.radicands.values():
@@ -66,12 +66,12 @@ class PointLoop(Loop):
 
     @property
     def radicands(self) -> dict[str, Poly]:
-        """Return what roots are of, by their names."""
+        """Return the radicands, by the names of their roots."""
         return {name: Poly(dict(terms)) for terms, name in self.ring.roots.items()}
 
     def divides_by_distances(self) -> None:
-        """Refuse equations that divide, where no guard says that it is positive, by other than sums of distances: roots of
-        squares of the place that grow in all directions."""
+        """Refuse equations with divisors, not guarded to be positive, other than sums of distances: roots of squares of the
+        position that grow in all directions."""
         place, distances = STATE[:3], set[str]()
         for name, p in self.radicands.items():
             curved = [[p.slope(a).slope(b).terms.get((), Fraction(0)) for b in place] for a in place]
@@ -80,6 +80,6 @@ class PointLoop(Loop):
             demand(b.names <= distances and min(b.terms.values()) > 0, "a divisor may be zero")
 
     def relay(self, wrong: list[Poly]) -> tuple[str, str]:
-        """Return the names of |wrong| and of its inverse; of none that is asked for where none is."""
+        """Return the names of |wrong| and of its inverse; empty names if none is used."""
         size = self.ring.roots.get(tuple(sorted(dot(wrong, wrong).terms.items())), "")
         return size, self.ring.inverses.get((((size,), var(size).terms[size,]),), "")

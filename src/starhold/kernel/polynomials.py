@@ -1,4 +1,4 @@
-"""Polynomials with exact coefficients, their derivatives, and variables put in place of one another."""
+"""Polynomials with exact coefficients, their derivatives, and substitution."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ DEGREE, TERMS, ZERO = 24, 100_000, Fraction(0)
 
 
 class Poly:
-    """A polynomial holds its coefficients, none of them zero, by monomial: whole numbers (`upper`) over one of their own
-    (`lower`), with no factor that all share. Nothing changes it."""
+    """A polynomial holds its nonzero coefficients by monomial: integers (`upper`) over a common denominator (`lower`), in
+    lowest terms. It is immutable."""
 
     def __init__(self, terms: Mapping[Monomial, Fraction | int], lower: int = 1) -> None:
         """Take coefficients over a positive number."""
@@ -38,12 +38,12 @@ class Poly:
 
     @cached_property
     def degree(self) -> int:
-        """Return the most factors of a term."""
+        """Return the largest number of factors in a term."""
         return max(map(len, self.upper), default=0)
 
     @cached_property
     def bits(self) -> int:
-        """Return the bits of the longest of its whole numbers."""
+        """Return the bit length of the longest integer."""
         return max(map(int.bit_length, (self.lower, *self.upper.values())))
 
     def __add__(self, other: Poly | Fraction | int) -> Poly:
@@ -83,11 +83,11 @@ class Poly:
         return Fraction(self.upper.get((), 0), self.lower)
 
     def only(self, wanted: Callable[[Monomial], bool]) -> Poly:
-        """Return the terms whose monomials are wanted."""
+        """Return the terms with the wanted monomials."""
         return Poly({m: c for m, c in self.upper.items() if wanted(m)}, self.lower)
 
     def slope(self, name: str) -> Poly:
-        """Return the derivative: every monomial with the name loses one, and gains its count as a factor."""
+        """Return the derivative with respect to a variable."""
         if name not in self._slopes:
             Account.spend(len(self.upper))
             upper = dict[Monomial, int]()
@@ -99,14 +99,14 @@ class Poly:
         return self._slopes[name]
 
     def powers(self, name: str) -> list[Poly]:
-        """Return the coefficients of a polynomial in one variable, from the lowest on."""
+        """Return the coefficients of a polynomial in one variable, in ascending order."""
         powers = [dict[Monomial, int]() for _ in range(1 + max((m.count(name) for m in self.upper), default=0))]
         for m, c in self.upper.items():
             powers[m.count(name)][tuple(x for x in m if x != name)] = c
         return [Poly(upper, self.lower) for upper in powers]
 
     def at(self, values: Mapping[str, Poly | Fraction | int]) -> Poly:
-        """Return the polynomial with numbers or polynomials in place of variables, all at once."""
+        """Return the polynomial with numbers or polynomials substituted for variables, all at once."""
         rest: dict[Monomial, dict[Monomial, int]] = {}
         for m, c in self.upper.items():
             placed = tuple(name for name in m if name in values)
@@ -171,7 +171,7 @@ def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
 
 
 def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
-    """Return a number that |p| does not exceed where no variable exceeds its size."""
+    """Return an upper bound of |p| for variables within their sizes."""
     if not p.upper:
         return ZERO
     names = [*p.names]
@@ -192,8 +192,7 @@ def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
 
 
 def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fraction]) -> Fraction:
-    """Return a number that |p'| does not exceed where variables besides change no faster than at their speeds, and others do
-    not change."""
+    """Return an upper bound of |p'| if the given variables change at most at their speeds, and the others are constant."""
     moving = [name for name in speeds if name in p.names]
     changing = [name for name in moving if sizes[name]]
     numbers, lower = whole([up(speeds[name] / sizes[name]) for name in changing])
@@ -204,7 +203,7 @@ def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fractio
 
 
 def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:
-    """Return f and c with p = f s + c; f is 0 where there are none."""
+    """Return f and c with p = f s + c; f is 0 if there are none."""
     first = max(s.terms, key=len)
     factor = p.terms.get(first, Fraction(0)) / s.terms[first]
     rest = p - factor * s

@@ -1,4 +1,4 @@
-"""Recorded programs: straight lines of the scalar operations that fly, read exactly, case by case."""
+"""Recorded programs: straight-line code of the scalar operations that fly, evaluated exactly, case by case."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _NAME = re.compile(r"[A-Za-z_]\w*(\.\w+)*", re.ASCII)
 
 @dataclass(frozen=True)
 class Program:
-    """A program has named inputs, steps, each an operation and the places of earlier values (or a constant), and the places
-    of its outputs. All are checked here: that a step reads only what is there, and numbers where it needs numbers."""
+    """A program has named inputs, steps, each an operation and the indices of earlier values (or a constant), and the
+    indices of its outputs. The reader checks that a step uses only existing values, and numbers where it needs numbers."""
 
     inputs: tuple[str, ...]
     steps: tuple[tuple[str, Any], ...]
@@ -73,7 +73,7 @@ class Program:
 
 
 def digest(given: Any) -> str:
-    """Return the name of a program as a certificate holds it: SHA-256 of its shortest JSON with sorted keys."""
+    """Return the name of a program in a certificate: SHA-256 of its shortest JSON with sorted keys."""
     return hashlib.sha256(json.dumps(given, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
@@ -84,7 +84,7 @@ Guards: TypeAlias = frozenset[tuple[Condition, bool]]
 
 @dataclass(frozen=True)
 class Case:
-    """A case is a value, a polynomial or a truth, where its guards hold."""
+    """A case is a value, a polynomial or a truth, valid where its guards hold."""
 
     guards: Guards
     value: Any
@@ -95,8 +95,8 @@ class Case:
         return [Poly(dict(p)) * (1 if above else -1) for p, above in sorted(self.guards)]
 
     def agrees(self, other: Case) -> bool:
-        """Tell whether values are the same where both cases hold, borders and all: a condition of the one excludes one of
-        the other, or leaves of both the border, on which the values do not differ."""
+        """Tell whether values are equal where both cases hold, boundaries included: a condition of one excludes one of the
+        other, or leaves only their common boundary, on which the values are equal."""
         gap = self.value - other.value
         if not gap.terms:
             return True
@@ -111,7 +111,7 @@ Piecewise: TypeAlias = list[Case]
 
 
 def condition(p: Poly) -> Condition:
-    """Return the same for p and for p times a positive number."""
+    """Return the same condition for p and for p times a positive number."""
     scale = abs(max(p.terms.values(), key=abs))
     return tuple(sorted((m, c / scale) for m, c in p.terms.items()))
 
@@ -128,7 +128,7 @@ def single(cases: Piecewise) -> Poly:
 
 
 def joined(values: Iterable[Piecewise], most: int = CASES) -> Piecewise:
-    """Return the cases of some values together, without those whose guards contradict each other."""
+    """Return the joint cases of some values, without those whose guards contradict each other."""
     together = [Case(frozenset(), [])]
     for cases in values:
         pairs = ((a.guards | b.guards, [*a.value, b.value]) for a in together for b in cases)
@@ -138,7 +138,7 @@ def joined(values: Iterable[Piecewise], most: int = CASES) -> Piecewise:
 
 
 def contradictory(guards: Guards) -> bool:
-    """Tell whether a condition is to hold and not to hold, or two that are opposite are to hold."""
+    """Tell whether a condition must both hold and fail, or two opposite ones must hold."""
     Account.spend(1 + len(guards))
     against = {(p, False) for p, truth in guards if truth}
     against |= {(tuple((m, -c) for m, c in p), True) for p, truth in guards if truth}
@@ -146,7 +146,7 @@ def contradictory(guards: Guards) -> bool:
 
 
 def positive(guards: Guards, p: Poly) -> bool | None:
-    """Tell whether p > 0 where guards hold, as far as one of them alone decides it: None where none does."""
+    """Tell whether p > 0 where the guards hold, as far as a single guard decides it; None if none does."""
     if not p.names:
         return p.number > 0
     for terms, above in guards:
@@ -160,7 +160,7 @@ def positive(guards: Guards, p: Poly) -> bool | None:
 
 
 class Exactly:
-    """A program is read over exact polynomials, case by case. Roots and quotients by the state are refused."""
+    """A program is evaluated over exact polynomials, case by case. Roots and quotients of the state are refused."""
 
     def __init__(self) -> None:
         self.inverses = dict[Condition, str]()
@@ -211,8 +211,8 @@ EXACT: dict[str, Callable[..., Any]] = {
 
 
 class Asking(Exactly):
-    """A program is read over polynomials in which roots n >= 0 and inverses s are variables, named by what they are of.
-    Unless `nested`, no root is taken, and nothing is divided by a quotient."""
+    """A program is evaluated over polynomials in which roots n >= 0 and inverses s are variables, named by their arguments.
+    Unless `nested`, no root is taken and nothing is divided by a quotient."""
 
     def __init__(self, nested: bool = True) -> None:
         super().__init__()

@@ -91,6 +91,13 @@ class Reader(ABC):
         changes = self.changes(sizes, turning)
         return sum((felt(parts, letter, sizes) * changes[letter] for letter in letters), ZERO)
 
+    def renewed(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
+        """Return by how much parts change at most from one sample to the next."""
+        changes = self.changes(sizes)
+        whole = {"r": 2 * changes["r"], "h": 2 * changes["h"], "a": 2 * self.size("a")}
+        whole["e"] = 2 * min(self.size("e"), self.gradual(sizes))
+        return sum((felt(parts, letter, sizes) * x for letter, x in whole.items()), ZERO)
+
     def unlike_body(self, sizes: Sizes, parts: Sequence[list[Poly]]) -> tuple[Fraction, Fraction]:
         """Return `stale` of two parts, of which the second follows momentum that turns with the body as without pushes; and
         what is more for each rate that pushes add until the end of a period."""

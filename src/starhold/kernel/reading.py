@@ -1,4 +1,4 @@
-"""Strict reading of a certificate: what is told twice, or told and not read, is refused, and so is what is too large."""
+"""Strict reading of a certificate: duplicate keys, unread entries and oversized values are refused."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _T = TypeVar("_T")
 
 
 class Told(Generic[_T]):
-    """A table of what a claim is told, which knows what of it was read."""
+    """A table of a claim, which records the entries that were read."""
 
     def __init__(self, name: str, content: Mapping[str, _T]) -> None:
         self.name, self.content, self.unread = name, dict(content), set(content)
@@ -38,12 +38,12 @@ class Told(Generic[_T]):
         return self.content.get(key)
 
     def close(self) -> None:
-        """Refuse what was not read."""
+        """Refuse entries that were not read."""
         demand(not self.unread, f"nothing depends on {', '.join(sorted(self.unread))} of the {self.name}")
 
 
 class Numbers(Told[Fraction]):
-    """The numbers of a claim: bounds, which are not negative, and coordinates of places, which are read as such."""
+    """The numbers of a claim: bounds, which are nonnegative, and coordinates, which are read as such."""
 
     def __getitem__(self, key: str) -> Fraction:
         bound = self.coordinate(key)
@@ -55,14 +55,14 @@ class Numbers(Told[Fraction]):
         return self[key] if key in self.content else None
 
     def coordinate(self, key: str) -> Fraction:
-        """Return a number that may have either sign."""
+        """Return a number of either sign."""
         return super().__getitem__(key)
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A theorem, words that the loop is taken with, programs by roles, exact numbers of the programs and the body (subject),
-    those that are claimed (numbers), and evidence by obligations."""
+    """A theorem, words that describe the loop, programs by roles, exact numbers of the programs and the body (subject), the
+    claimed numbers, and evidence by obligations."""
 
     theorem: str
     taken: Told[bool]
@@ -99,7 +99,7 @@ def read_certificate(text: str) -> list[Claim]:
 
 
 def read_claim(given: Any, programs: Told[Program]) -> Claim:
-    """Read a claim, of which the programs are told by their digests."""
+    """Read a claim, which refers to its programs by their digests."""
     keys = ("theorem", "taken", "programs", "subject", "numbers", "evidence")
     theorem, taken, roles, subject, numbers, evidence = read_table(given, *keys)
     demand(isinstance(theorem, str), "a theorem has no name")

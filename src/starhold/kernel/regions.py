@@ -35,10 +35,11 @@ class Region:
     least: Fraction
 
     def within(self, X: Rows, swayed: Radii = AT_REST) -> Region:
-        """Return the part that lies no further than `swayed` from an ellipsoid."""
+        """Return the part that lies no further than `swayed` from an ellipsoid, of the state alone."""
+        state = [row[: len(STATE)] for row in X[: len(STATE)]]
         sizes = {name: root(X[i][i]) + swayed[i // 3] for i, name in enumerate(STATE)}
         sizes |= {name: x + more for (name, x), more in zip(lengths(X).items(), swayed, strict=True)}
-        return Region(widened(X, swayed), self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()}, self.least)
+        return Region(widened(state, swayed), self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()}, self.least)
 
     def around(self, radii: Radii, pull: Fraction) -> Region:
         """Return the part where |w| and |q| are no more than told, nor the acceleration that is linear in the state."""

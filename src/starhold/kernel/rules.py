@@ -1,4 +1,4 @@
-"""The rules. Each decides what it says from evidence, and searches nothing: `check` refuses what does not show it."""
+"""The rules. Each decides its statement from evidence, without a search: `check` refuses evidence that does not prove it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .sentences import Statement
 
 
 def combination(cofactors: Any, relations: Sequence[Poly]) -> Poly:
-    """Return the sum of relations, each times its cofactor of the evidence."""
+    """Return the sum of the relations, each times its cofactor in the evidence."""
     return dot([read_poly(c) for c in read_list(cofactors, len(relations))], relations)
 
 
 def weighted(weights: Any, parts: Sequence[Poly], strict: int) -> Poly:
-    """Return the sum of parts, each times its number of the evidence: none is negative, and the first are positive."""
+    """Return the sum of the parts, each times its number in the evidence: none is negative, and the first are positive."""
     multipliers = [rational(x) for x in read_list(weights, len(parts))]
     demand(all(x >= 0 for x in multipliers), "a multiplier is negative")
     demand(all(x > 0 for x in multipliers[:strict]), "a multiplier is not positive")
@@ -26,7 +26,7 @@ def weighted(weights: Any, parts: Sequence[Poly], strict: int) -> Poly:
 
 
 def form(rows: Any, z: Sequence[Poly], strictly: bool) -> Poly:
-    """Return z'Gz, with a G of the evidence that is positive definite, or is nowhere negative."""
+    """Return z'Gz, with a positive definite or semidefinite G of the evidence."""
     gram = matrix(rows, len(z), len(z))
     demand(definite(gram, strictly), "a matrix is not positive definite")
     return total(a * dot([x * (1 + (i != k)) for k, x in enumerate(gram[i][: i + 1])], z[: i + 1]) for i, a in enumerate(z))
@@ -34,7 +34,7 @@ def form(rows: Any, z: Sequence[Poly], strictly: bool) -> Poly:
 
 @dataclass(frozen=True)
 class Vanishes:
-    """p is zero wherever the relations are. Evidence: their cofactors; none without relations."""
+    """p is zero wherever the relations are. Evidence: their cofactors; none if there are no relations."""
 
     p: Poly
     modulo: Sequence[Poly] = ()
@@ -47,11 +47,13 @@ class Vanishes:
 
 @dataclass(frozen=True)
 class Squares:
-    """p >= 0 wherever the known are not negative and the relations are zero; there even p >= c (z_1^2 + ... + z_n^2) with a
-    c > 0 for the first n = `least` of z (of 0: p >= 0 alone). A multiplier of what is `strict` is positive.
+    """p >= 0 wherever the known polynomials are nonnegative and the relations are zero; there even p >= c (z_1^2 + ... +
+    z_n^2) with a c > 0 for the first n = `least` of z (n = 0: only p >= 0). A multiplier of a `strict` polynomial is
+    positive.
 
-    Evidence: p = multipliers.known + cofactors.relations + z'Gz. G may be about the first of z alone, no fewer than n; it is
-    positive definite, or for n = 0 only nowhere negative."""
+    Evidence: p = multipliers.known + cofactors.relations + z'Gz. G may use only the first entries of z, at least n of them;
+    it is positive definite, or for n = 0 positive semidefinite.
+    """
 
     p: Poly
     z: Sequence[Poly]
@@ -71,10 +73,12 @@ class Squares:
 
 @dataclass(frozen=True)
 class Sum:
-    """p >= the sum of the `strict`, each times a positive number, wherever the known are not negative and the relations are
-    zero (the easy half of Schmuedgen's Positivstellensatz).
+    """p >= the sum of the `strict` polynomials, each times a positive number, wherever the known ones are nonnegative and
+    the relations are zero (the easy half of Schmuedgen's Positivstellensatz).
 
-    Evidence: p = numbers.strict + cofactors.relations + the sum of parts, each z'Gz times the known of these places."""
+    Evidence: p = numbers.strict + cofactors.relations + the sum of parts, each z'Gz times the known polynomials at these
+    indices.
+    """
 
     p: Poly
     known: Sequence[Poly] = ()
@@ -97,8 +101,8 @@ class Sum:
 
 @dataclass(frozen=True)
 class Contracts:
-    """Every eigenvalue of A is smaller than the rate in size, or of a flow x' = Ax has a negative real part. Evidence: P > 0
-    with rate^2 P - A'PA > 0, or with -(A'P + PA) > 0 (Lyapunov)."""
+    """Every eigenvalue of A has a modulus below the rate; for a flow x' = Ax, a negative real part. Evidence: P > 0 with
+    rate^2 P - A'PA > 0, or with -(A'P + PA) > 0 (Lyapunov)."""
 
     A: Rows
     rate: Fraction = Fraction(1)
@@ -113,8 +117,8 @@ class Contracts:
 
 @dataclass(frozen=True)
 class Persists:
-    """Some motions x+ = Ax do not come to zero. Evidence: P, somewhere positive, with A'PA - P nowhere negative: x'Px does
-    not fall (Chetaev)."""
+    """Some motions x+ = Ax do not converge to zero. Evidence: P, positive somewhere, with A'PA - P positive semidefinite:
+    x'Px is non-decreasing (Chetaev)."""
 
     A: Rows
 
@@ -126,7 +130,7 @@ class Persists:
 
 @dataclass(frozen=True)
 class Definite:
-    """A matrix is symmetric and positive definite. Without evidence."""
+    """A matrix is symmetric and positive definite. It needs no evidence."""
 
     a: Rows
 
@@ -137,7 +141,7 @@ class Definite:
 
 @dataclass(frozen=True)
 class Exceeds:
-    """A number is larger than another. Without evidence."""
+    """A number is larger than another. It needs no evidence."""
 
     large: Fraction
     small: Fraction | int = 0
@@ -157,5 +161,5 @@ Proof: TypeAlias = Part[Statement]
 
 
 def vanish(name: str, parts: Iterable[Poly], modulo: Sequence[Poly] = (), first: int = 0) -> Shown:
-    """Each of some polynomials is zero; they are numbered."""
+    """Check that each of some polynomials is zero; they are numbered."""
     yield from ((f"{name} {k}", Vanishes(p, modulo)) for k, p in enumerate(parts, first))

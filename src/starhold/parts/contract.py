@@ -149,13 +149,13 @@ class Push(NamedTuple):
 class Late(NamedTuple):
     """How what a part gives is late, in a loop of one control period. Let e be the command less what acts. In a period |e|
     does not grow, is no more than `mean` times its first value in the mean, and `kept` times that in the end; then it
-    changes by as much as the command. All this while no component of e exceeds `most`. alike: e keeps its direction, and
-    falls exactly so."""
+    changes by as much as the command. All this while no component of e exceeds `most`. moment: of what is linear, so that e
+    keeps its direction and these shares are exact, the mean in which it counts by the share of the period that is left."""
 
     kept: float
     mean: float
     most: float = math.inf
-    alike: bool = False
+    moment: float | None = None
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def read_toml(text: str, where: str) -> dict[str, Any]:
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(where, "", f"not TOML: {cut(str(error), 200)}", "a TOML file") from None
+        raise InputError(where, "", "", f"not TOML: {cut(str(error), 200)}") from None
     except RecursionError:
         raise InputError(where, "", "tables or lists too deep", f"at most {DEEPEST} within one another") from None
     except ValueError:

@@ -19,7 +19,7 @@ from starhold.certification.evidence.squares import rounded
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
 from starhold.kernel.numbers import RefusedError, plus, times, transpose
-from starhold.kernel.regions import STATE, Tube, balls, widened
+from starhold.kernel.regions import STATE, Tube, balls
 from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread
 from starhold.kernel.theorems.response import first_of, responds
 
@@ -121,7 +121,7 @@ class Chain:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
         angle, fastest = ends(self.motion, tube, tube.region.X)
         heed, corners = HEED, self.motion.corners()
-        away = self.motion.away
+        away, entered = self.motion.away, self.motion.entered(tube)
         for _ in range(ELLIPSOIDS):
             within, more = forgotten(self.motion, tube)
             pushes = self.motion.linear(within)
@@ -134,7 +134,7 @@ class Chain:
             added = spread(a, pushes)
             moved = (plus(added, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
             rate = max(highest_ratio(after, X) for after in moved)
-            reach = highest_ratio(widened(within.region.X, away), X)
+            reach = highest_ratio(entered, X)
             inner = self.motion.tube(within.region.within(X, away))
             end = ends(self.motion, inner, X, away)
             if rate >= 1.0 or end[0] > angle * 0.99:
@@ -154,13 +154,14 @@ class Chain:
             room = 1 - sum(a)
             fall = 1 - Fraction(rate) * room
             self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
-            tube, (angle, fastest) = inner, end
+            tube, entered, (angle, fastest) = inner, X, end
         return angle, fastest
 
     def nearest(self) -> tuple[Chain, tuple[float, float]]:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
         (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
         tube, _ = on_level(self.motion, Fraction(self.levels[-1]["end"]))
+        self.motion.nears(tube)
         one = replace(self, ellipsoids=list[Any]())
         ends = [(one, one.respond(tube))]
         if not one.response or self.motion.loop.wheels:

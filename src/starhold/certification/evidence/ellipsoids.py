@@ -25,8 +25,6 @@ NEARLY = 1e-3
 """The share by which the linear motion is first scaled, to allow for the wheels' momentum."""
 MORE, LARGER = 1.0 + 1e-9, 1.005
 """The margin for rounding, and that of ellipsoids above the least, so that motions enter them in finite time."""
-PAIRS = [(i, k) for k in range(6) for i in range(k + 1)]
-"""The entries of a symmetric matrix by which an interior point knows it."""
 
 
 def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tuple[Array, list[float]] | None:
@@ -84,20 +82,23 @@ def fitted(corners: Array, pushes: list[Array], shares: Array, X: Array, heed: f
     if kept <= 0.0:
         return None
     fed = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(X)) / np.outer(scale, scale)
-    basis = np.array([[[float({i, k} == {a, b}) for a in range(6)] for b in range(6)] for i, k in PAIRS])
+    size = len(X)
+    # The entries of a symmetric matrix by which an interior point knows it.
+    pairs = [(i, k) for k in range(size) for i in range(k + 1)]
+    basis = np.array([[[float({i, k} == {a, b}) for a in range(size)] for b in range(size)] for i, k in pairs])
     rows, right = list[Array](), list[Array]()
     for corner in corners * scale / scale[:, None]:
-        rows.append(np.hstack([-triangle(basis - corner @ basis @ corner.T / kept).T, np.zeros((len(PAIRS), 2))]))
+        rows.append(np.hstack([-triangle(basis - corner @ basis @ corner.T / kept).T, np.zeros((len(pairs), 2))]))
         right.append(-triangle(fed))
     for place, part in enumerate((RATE, TURN)):
         units = -np.eye(2)[place][:, None, None] * np.diag(1.0 / scale[part] ** 2) * float(np.min(scale[part])) ** 2
         rows.append(triangle(np.concatenate([basis[:, part, part], units])).T)
         right.append(np.zeros(6))
-    cost = np.array([*[0.0] * len(PAIRS), heed, 1.0])
-    solution = interior_point(cost, entries_of(np.vstack(rows)), np.concatenate(right), 0, 0, [6] * len(corners) + [3, 3])
+    cost = np.array([*[0.0] * len(pairs), heed, 1.0])
+    solution = interior_point(cost, entries_of(np.vstack(rows)), np.concatenate(right), 0, 0, [size] * len(corners) + [3, 3])
     if solution is None:
         return None
-    fit = np.einsum("n,nij->ij", solution[: len(PAIRS)], basis) * np.outer(scale, scale)
+    fit = np.einsum("n,nij->ij", solution[: len(pairs)], basis) * np.outer(scale, scale)
     plain = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(X))
     room = fit - corners @ fit @ corners.transpose(0, 2, 1) / kept
     if np.linalg.eigvalsh(fit)[0] <= 0.0 or np.linalg.eigvalsh(room).min() <= 0.0:

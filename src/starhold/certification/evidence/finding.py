@@ -97,7 +97,7 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
 
 
 def combined(name: str, o: rules.Vanishes) -> list[Poly]:
-    """Return numbers for cofactors: those with which the relations make a polynomial."""
+    """Return numbers for the cofactors, with which the relations combine to a polynomial."""
     cofactors = solved(o.p, list(o.modulo))
     if cofactors is None:
         raise NotFoundError("the torque at rest vanishes elsewhere too" if name.startswith("only") else name)
@@ -137,7 +137,7 @@ def _rounded(P: Any) -> list[list[str]]:
 
 
 def persists(o: rules.Persists) -> list[list[str]]:
-    """Return the matrix of a form that grows along x+ = Ax, as A'PA - P = 1 has it, or A'PA - c^2 P with c near 1."""
+    """Return the matrix of a form that grows along x+ = Ax, from A'PA - P = 1, or A'PA - c^2 P = 1 with c near 1."""
     A = floats(o.A)
     for c in (1.0, 1.0 + 1e-6, 1.0 + 1e-4, 1.0 + 1e-2):
         try:
@@ -150,7 +150,7 @@ def persists(o: rules.Persists) -> list[list[str]]:
 
 
 def by_digests(programs: Iterable[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return programs by the names that claims have for them."""
+    """Return programs by the names that claims use for them."""
     return {digest(program): program for program in programs}
 
 
@@ -175,7 +175,7 @@ def certificate(programs: list[dict[str, Any]], claims: list[dict[str, Any]]) ->
 
 
 def concluded(part: Part[T]) -> T:
-    """Return what follows from obligations that are taken to be met."""
+    """Return the conclusion, with the obligations taken as met."""
     while True:
         try:
             next(part)

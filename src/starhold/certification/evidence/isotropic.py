@@ -78,7 +78,7 @@ LESS = (3e-3, 1e-2, 2e-2, 3e-2, 0.1, 0.2, 0.3)
 
 
 class Reach(NamedTuple):
-    """A V that was recorded, what the kernel asks of its decrease for the level 1, and about the largest level (1/s2)."""
+    """A recorded V, the obligation of the kernel about its decrease for the level 1, and about the largest level (1/s2)."""
 
     shape: Shape
     V: str
@@ -113,7 +113,7 @@ def find_isotropic(loop: Loop) -> None:
 
 
 def units(level: float) -> dict[str, float]:
-    """Return about how large u, t and v become."""
+    """Return the approximate largest values of u, t and v."""
     return {"u": 1.0, "t": 1.0, "v": sqrt(2.0 * level)}
 
 
@@ -123,12 +123,12 @@ def words(loop: Loop) -> list[str]:
 
 
 def short(x: float) -> float:
-    """Return a number of few binary digits: what is exact becomes long of long numbers."""
+    """Return a number of few binary digits: exact expressions of long numbers become long."""
     return float(rounded(x, 4))
 
 
 def in_seconds(shape: Shape, a: float) -> Shape:
-    """Return about the shape that for the root -1/s is what this one is for the root a."""
+    """Return about the shape for the root -1/s that corresponds to this one for the root a."""
     return Shape(short(a * a * shape.p), short(a * a * shape.c2), short(-a * shape.g), short(-a * shape.m))
 
 

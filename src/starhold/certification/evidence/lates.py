@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
-from math import isfinite
+from math import ceil, floor, isfinite
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import floats
-from starhold.kernel.follower import LATE, Late
+from starhold.kernel.follower import KNOWN, LATE, Late
 from starhold.kernel.held import Held
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.regions import RATE, STATE, TURN
@@ -23,20 +23,28 @@ DIGITS, STARTS, BEYOND = 7, 500, 1.02
 """The digits of numbers; how many starts are tried, and the margin for others."""
 MARGINS = (1.05, 1.05, 1.05, 1.1)
 """By how much each bound of a part is larger than what follows from the one before."""
-LEAST = 1.0 - 4e-6
-"""How exactly it is known at least how late something is."""
+LEAST, FINE = 1.0 - 4e-6, 1 << 30
+"""How exactly it is known at least how late something is, and the denominator of that."""
 WEIGHT = 0.9
 """The weight with which what is late costs V the least, where it does so by the product of two forms."""
 
 
-def numbers_of(late: contract.Late | None) -> dict[str, float]:
+def numbers_of(late: contract.Late | None) -> dict[str, Any]:
     """Return the numbers of a claim about a torque that is late, before its weight is known."""
     if late is None:
         return {}
     numbers = {"kept": late.kept, "mean": late.mean, "most": late.most, "weight": 1.0, "begun": 0.0, "rest": 0.0}
-    if late.alike:
-        numbers |= {"kept.least": late.kept * LEAST, "mean.least": late.mean * LEAST}
-    return {LATE + name: x for name, x in numbers.items() if isfinite(x)}
+    claimed: dict[str, Any] = {LATE + name: x for name, x in numbers.items() if isfinite(x)}
+    for name, (most, least) in zip(KNOWN, alike(late), strict=True) if late.moment is not None else ():
+        claimed |= {LATE + name: most, f"{LATE}{name}.least": least}
+    return claimed
+
+
+def alike(late: contract.Late) -> list[tuple[Fraction, Fraction]]:
+    """Return what is known at most and at least, in short numbers, of how late a torque is that nears what is asked for
+    alike in all components: in the end of a period, in the mean, and in that by the time that is left."""
+    shares = [float(getattr(late, name)) for name in KNOWN]
+    return [(Fraction(ceil(x * FINE), FINE), Fraction(floor(x * LEAST * FINE), FINE)) for x in shares]
 
 
 def of_late(late: Late | None) -> dict[str, Fraction]:
@@ -78,7 +86,7 @@ def resting(motion: Held, level: float) -> Late | None:
         for more in MARGINS:
             tube = motion.tube(motion.region(Fraction(level)))
             if change := motion.change_in(tube):
-                late = motion.late = replace(late, rest=rounded(float(change.settled(tube, False)) * more, DIGITS))
+                late = motion.late = replace(late, rest=rounded(float(change.settled) * more, DIGITS))
     except RefusedError:
         return unrested
     return late

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.lates import alike
 from starhold.certification.matrices import floats
 from starhold.certification.unmodelled import driven_errors, noisy_fields, samples_of
-from starhold.kernel.follower import steadied
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.theorems.noise import (
@@ -40,9 +40,9 @@ WIDER, LEAST, MORE, DIGITS = 1e-6, 1e-30, 1.0 + 1e-9, 9
 covariances, because long numbers take long."""
 
 
-SHARES = (0.05, 0.05, 0.05, 0.85)
-"""The shares of the probability for the radii of attitude and rate errors of the measurement, and of the rate and the
-rotation that they cause; with wheels a tenth of each is for what momentum makes of the last two."""
+SHARES = (0.05, 0.05, 0.05, 0.8499, 1e-4)
+"""The shares of the probability for the radii of attitude and rate errors of the measurement, and of the rate, the rotation
+and of what lags the torque that they cause; with wheels a tenth of each is for what momentum makes of the last two."""
 
 
 def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[str, Any]] | None:
@@ -53,10 +53,10 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
         return None
     near, every, spins = near_target(wired, Fraction(loop.loop.period)), noise.recursion.every, spins_of(wired)
     late = loop.known.late
-    if late is not None and late.alike:
-        near, _ = steadied(near, Fraction(loop.loop.period), Fraction(late.kept), Fraction(late.mean))
+    if late is not None and late.moment is not None:
+        near = near.lagging(Fraction(loop.loop.period), *(known[0] for known in alike(late)))
     errors = [linear(wired.claim, role) for role in (CARRIED, CORRECTED)]
-    parts, shapes = parts_of(len(errors[0][0][0]), spins), list[Array]()
+    parts, shapes = parts_of(near, len(errors[0][0][0]), spins), list[Array]()
     widths = dict.fromkeys(parts, 0.0)
     for spin in spins:
         every_step = (driven(near, *pair, spin, Fraction(noise.torque)) for pair in errors)
@@ -88,7 +88,10 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
 
         return width * float(optimize.brentq(missed, 1.0, 12.0)) * MORE
 
-    shares = SHARES if len(parts) == len(SHARES) else (*(0.9 * x for x in SHARES), *(0.1 * SHARES[0],) * 2)
+    count = len(near.A) // 3
+    shares = (
+        SHARES[: 2 + count] if spins == [None] else (*(0.9 * x for x in SHARES[: 2 + count]), *(0.1 * SHARES[0],) * count)
+    )
     # A random torque takes as much as an error.
     shares = [x * (1.0 - SHARES[0] * bool(noise.torque)) for x in shares]
     often = [len(spins) * len(pair) if k > 1 else 1 for k, pair in enumerate(parts.values())]

@@ -30,7 +30,6 @@ from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand
 from starhold.kernel.plans import Plan
-from starhold.kernel.regions import AT_REST
 from starhold.kernel.theorems.noise import SHARE
 from starhold.parts.craft import tensor
 
@@ -127,8 +126,7 @@ class Pushed:
         if loop.plan is not None:
             planned, about = told_of(loop, loop.plan)
             more, self.evidence = more | planned, self.evidence | about
-        wide, turned, *apart = map(Fraction, self.evidence.get("swayed", ("0", "0")))
-        self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
+        self.radii = [*map(Fraction, self.evidence.get("swayed", ()))]
         changes = change_of_modelled(loop.loop, loop.known.envelope(noisy)) if OUTSIDE in words else (inf,)
         self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
         slow = sqrt(self.stiffness / float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1]))
@@ -150,7 +148,8 @@ class Pushed:
             wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
             motion = Held(wired, self.plan)
             self.plan = motion.plan
-            motion.swayed, motion.apart = self.swayed, self.apart
+            if self.radii:
+                motion.sways(self.radii)
             motion.late = weighed(motion, self.scales)
             self.known[shape] = Lean(shape, V, motion, {})
         return self.known[shape]

@@ -29,7 +29,7 @@ def find_response(motion: Held) -> dict[str, Any] | None:
     if radius >= 1.0 or -SHORTEST / log(radius) > MOST:
         return None
     count = min(ceil(-LEFT / log(radius)), MOST)
-    powers = [np.vstack([np.eye(6), floats(motion.near.rates)])]
+    powers = [np.vstack([np.eye(6), floats(motion.near.rates)]) @ np.eye(6, len(A))]
     for _ in range(count - 1):
         powers.append(powers[-1] @ A)
     weighed, gains, B = list[list[int]](), list[list[str]](), list(map(floats, motion.ways))

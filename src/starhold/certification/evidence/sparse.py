@@ -1,5 +1,5 @@
-"""Sparse matrices as an interior point takes them. `scipy.sparse` takes longer to load than most proofs take to be found, so
-only what multiplies matrices loads it."""
+"""Sparse matrices in the form of an interior point. Loading `scipy.sparse` takes longer than finding most proofs, so only
+the multiplication of matrices loads it."""
 
 from collections.abc import Sequence
 from importlib import import_module
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 class Compressed(NamedTuple):
-    """A matrix column by column, rows in order, in the fields that Clarabel reads of a `scipy.sparse.csc_matrix`."""
+    """A matrix in compressed columns, rows sorted, with the fields of a `scipy.sparse.csc_matrix` that Clarabel reads."""
 
     data: NDArray[np.float64]
     indices: NDArray[np.int64]
@@ -19,12 +19,12 @@ class Compressed(NamedTuple):
     has_canonical_format: bool = True
 
     def key(self) -> tuple[Any, ...]:
-        """Return what two matrices have in common only if they are equal."""
+        """Return a key that two matrices share only if they are equal."""
         return self.data.tobytes(), self.indices.tobytes(), self.indptr.tobytes(), self.shape
 
 
 class Entries(NamedTuple):
-    """A matrix by the rows, columns and values of its entries, of which none has the place of another."""
+    """A matrix by the rows, columns and values of its entries, without duplicates."""
 
     rows: Sequence[int] | NDArray[np.integer]
     columns: Sequence[int] | NDArray[np.integer]
@@ -39,7 +39,7 @@ class Entries(NamedTuple):
         return Compressed(np.asarray(self.values, dtype=float)[order], rows[order], ends, self.shape)
 
     def above(self, below: "Entries") -> "Entries":
-        """Return the matrix with another one below it."""
+        """Return the matrix with another one stacked below it."""
         rows = np.concatenate(
             [np.asarray(self.rows, dtype=np.int64), np.asarray(below.rows, dtype=np.int64) + self.shape[0]]
         )
@@ -59,6 +59,6 @@ class Entries(NamedTuple):
 
 
 def entries_of(matrix: NDArray[np.float64]) -> Entries:
-    """Return the entries of a dense matrix that are not zero."""
+    """Return the nonzero entries of a dense matrix."""
     rows, columns = matrix.nonzero()
     return Entries(rows, columns, matrix[rows, columns], (matrix.shape[0], matrix.shape[1]))

@@ -69,7 +69,7 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
 
 
 def plainly(o: Squares) -> dict[str, Any] | None:
-    """Return evidence whose matrix is the rest of p without relations; None where that is refused."""
+    """Return evidence whose matrix is the remainder of p, without relations; None if that is refused."""
     p, known, fixed = settled(o)
     problem = posed(p, known, [], o.z)
     if o.modulo or not p.terms.keys() <= {m for q in problem.columns for m in q.terms}:
@@ -84,7 +84,7 @@ def plainly(o: Squares) -> dict[str, Any] | None:
 
 
 def counts(o: Squares) -> list[int]:
-    """Return how many of z a matrix may be about: up to where another kind of monomial begins."""
+    """Return how many entries of z a matrix may use: up to where another kind of monomial begins."""
     kinds = ["".join(sorted(name[0] for name in max(z.terms))) for z in o.z]
     ends = [k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]]
     names = {name for p in (o.p, *o.known) for name in p.names}
@@ -93,7 +93,7 @@ def counts(o: Squares) -> list[int]:
 
 
 def free(columns: Sequence[Poly], z: Sequence[Poly]) -> Sequence[Poly]:
-    """Return z without those of which the matrix would have to have a zero for the square, that nothing else makes."""
+    """Return z without the monomials whose squares occur nowhere else, because the matrix would need a zero there."""
     pairs, grams = products(z)
     others = {m for q in columns for m in q.upper}
     others |= {m for (i, k), q in zip(pairs, grams, strict=True) if i != k for m in q.upper}
@@ -115,8 +115,8 @@ def settled(o: Squares) -> tuple[Poly, list[Poly], dict[int, Fraction]]:
 
 
 def ansatzes(o: Squares, p: Poly, known: list[Poly], count: int) -> list[list[list[Poly]]]:
-    """Return what is tried for cofactors: first only what makes no monomial that nothing else has, so that all that rounding
-    leaves can be put on the matrix."""
+    """Return the candidate cofactors: first only those without new monomials, so that the matrix can absorb all rounding
+    errors."""
     whole = cofactors(o, p, count)
     monomials = {m for q in (p, *known, *products(o.z[:count])[1]) for m in q.upper}
     fitting = [
@@ -154,7 +154,7 @@ def posed(p: Poly, known: list[Poly], others: list[Poly], z: Sequence[Poly]) -> 
 
 
 def products(z: Sequence[Poly]) -> tuple[list[tuple[int, int]], list[Poly]]:
-    """Return the places of a Gram matrix's upper triangle, and what its entries stand before."""
+    """Return the indices of a Gram matrix's upper triangle, and the products that its entries multiply."""
     return _products(tuple(tuple(sorted(p.terms.items())) for p in z))
 
 
@@ -239,7 +239,7 @@ def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
 
 
 def largest_number(problem: Problem, scales: Mapping[str, float], wanted: Poly) -> float | None:
-    """Return the largest x for which p - x wanted is a sum as the problem says; None where there is none."""
+    """Return the largest x for which p - x wanted is a sum as in the problem; None if there is none."""
     A, b, largest = equations(problem, scales, [wanted])
     unit = float(np.abs(b).max()) or 1.0
     x = optimum(A, b / unit, [False] * problem.signed, [problem.pairs], 2.0, margin=False)
@@ -292,7 +292,7 @@ def sparse_of(polys: Sequence[Poly]) -> Entries:
 
 
 def on_a_face(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
-    """Return exact factors with a singular matrix, that takes to zero what the guess takes almost there."""
+    """Return exact factors with a singular matrix, whose kernel is near that of the guess."""
     head, size = len(problem.columns) - len(problem.pairs), len(problem.z)
     G = np.zeros((size, size))
     for (i, k), v in zip(problem.pairs, guess[head:], strict=True):
@@ -325,7 +325,7 @@ def on_a_face(problem: Problem, guess: Any, digits: int) -> list[Fraction] | Non
 
 
 def shared_out(problem: Problem, x: list[Fraction], head: int) -> list[Fraction] | None:
-    """Put what is amiss of each monomial on the entries of the matrix that have it; None where none has."""
+    """Distribute the error of each monomial over the entries of the matrix that produce it; None if none does."""
     x = list(x)
     places: dict[Monomial, list[int]] = {}
     for k, column in enumerate(problem.columns[head:], head):

@@ -1,4 +1,4 @@
-"""The theorems by name. Each yields what has to be shown about a claim's loop, and then what it says."""
+"""The theorems by name. Each yields the obligations about a claim's loop, and then its statement."""
 
 from __future__ import annotations
 

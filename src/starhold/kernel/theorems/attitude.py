@@ -1,8 +1,8 @@
 """Theorems that a law turns a rigid body to its target. Proofs: docs/kernel.md, section 3.
 
-All of them are about the loop of `loops`, in which nothing but the state (q, w) may be left (`autonomous`). Numbers that a
-claim may have: `level`, of V, at which motions start; `fastest`, a rate that they do not exceed from there; what the set
-{V <= level} holds (`contents`); and limits (`limits`).
+All of them are about the loop of `loops`, which must depend on nothing but the state (q, w) (`autonomous`). Optional numbers
+of a claim: `level`, of V, at which motions start; `fastest`, a rate that they do not exceed from there; the contents of the
+set {V <= level} (`contents`); and limits (`limits`).
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from .limits import within_limits
 
 
 def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False, near: bool = False) -> Proof:
-    """Every motion comes to rest on target, or, almost never, on the other quaternion of the same attitude. V' <= -c |w|^2,
-    `strictly` -c (|w|^2 + |q|^2). `any_inertia`: so does every body, while the law's own numbers stay; `near`: so does every
-    one with an inertia near the given one."""
+    """Every motion converges to rest on target or, for a set of starts of measure zero, to the other quaternion of the same
+    attitude. V' <= -c |w|^2, `strictly` -c (|w|^2 + |q|^2). `any_inertia`: so does every body under the unchanged law;
+    `near`: so does every body with an inertia near the given one."""
     loop = AttitudeLoop(claim, any_inertia, near)
     w = loop.w
     yield from least_on_target(loop)
@@ -38,7 +38,7 @@ def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False, n
 
 
 def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
-    """Every motion comes to rest on target, on either quaternion, or at a half turn, each of which is unstable."""
+    """Every motion converges to rest on target, on either quaternion, or to a half turn, each of which is unstable."""
     loop = AttitudeLoop(claim, any_inertia)
     vector, resting, level = loop.q[1:], loop.lyapunov.at(loop.still), claim.numbers.get("level")
     yield from least_on_target(loop, vector)
@@ -54,7 +54,7 @@ def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
 
 
 def least_on_target(loop: AttitudeLoop, turned: Sequence[Poly] = ()) -> Shown:
-    """V >= c (|turned|^2 + |w|^2), turned being (1 - q0, q) unless told. Of an inertia that is not known V has the kinetic
+    """V >= c (|turned|^2 + |w|^2), with turned = (1 - q0, q) unless given. For an unknown inertia V contains the kinetic
     energy, with v = w + lean q for w, of which only v.Jv > 0 is used."""
     yield from loop.sound()
     z, momentum, energy = [*(turned or [1 - loop.q[0], *loop.q[1:]])], apply(loop.J, loop.leaning), kinetic(loop)
@@ -67,14 +67,15 @@ def least_on_target(loop: AttitudeLoop, turned: Sequence[Poly] = ()) -> Shown:
 
 
 def kinetic(loop: AttitudeLoop, more: Fraction | int = 0) -> list[Poly]:
-    """Return v.Jv for an inertia that is not known, where v leans by so much more."""
+    """Return v.Jv for an unknown inertia, with this much more lean in v."""
     v = [x + more * q for x, q in zip(loop.leaning, loop.q[1:], strict=True)]
     return [dot(v, apply(loop.J, v))] if loop.any_inertia else []
 
 
 def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part[list[str]]:
-    """V' <= -c times the squares of the first of z, everywhere or, with a level, on {V <= level}, which is then not left; if
-    `fastest` is told, there the rate is at most that. Where the law has cases, V' <= -c in all that hold around no rest."""
+    """V' <= -c times the squares of the first entries of z, everywhere or, with a level, on {V <= level}, which is then
+    invariant; with `fastest`, the rate there is at most that. If the law has cases, V' <= -c in all cases that do not hold
+    around a rest."""
     numbers, V, w = loop.claim.numbers, loop.lyapunov, loop.w
     level, fastest = numbers.get("level"), numbers.get("fastest")
     known = loop.shifted()
@@ -106,7 +107,7 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
 
 
 def concluded(loop: AttitudeLoop, said: list[str]) -> Proof:
-    """Settle the part that the rest at q0 = -1 and the quaternion's sign play."""
+    """Decide the role of the rest at q0 = -1 and of the quaternion's sign."""
     numbers, V, q, w = loop.claim.numbers, loop.lyapunov, loop.q, loop.w
     level = numbers.get("level")
     away = V.at(loop.opposite | loop.still)
@@ -140,7 +141,7 @@ def concluded(loop: AttitudeLoop, said: list[str]) -> Proof:
 
 
 def finished(loop: AttitudeLoop, said: list[str], *assumed: str) -> Proof:
-    """Add what the set holds and the limits, and say all that was shown."""
+    """Add the contents of the set and the limits, and state the result."""
     contained = yield from contents(loop, loop.lyapunov)
     limited = yield from within_limits(loop)
     if loop.near:
@@ -154,8 +155,8 @@ def finished(loop: AttitudeLoop, said: list[str], *assumed: str) -> Proof:
 
 
 def contents(loop: AttitudeLoop, V: Poly) -> Part[list[str]]:
-    """{V <= level} holds every attitude at rest turned by up to `angle`; on target every rate up to `rate`; and every state
-    turned by up to `start.angle` at up to `start.rate`."""
+    """{V <= level} contains every attitude at rest turned by up to `angle`; on target every rate up to `rate`; and every
+    state turned by up to `start.angle` at up to `start.rate`."""
     numbers, q, w, one = loop.claim.numbers, loop.q, loop.w, poly(1)
     level, said = numbers.get("level"), list[str]()
 
@@ -187,8 +188,8 @@ def contents(loop: AttitudeLoop, V: Poly) -> Part[list[str]]:
 
 
 def converges_without_axes(claim: Claim) -> Proof:
-    """Every motion from {V <= level} stays there and comes to rest on target: V is least on target, and on the set
-    V' <= -c (|w|^2 + |q|^2). Both are shown where w = (v, 0, 0) and q = (t, n, 0)."""
+    """Every motion from {V <= level} stays there and converges to rest on target: V has its minimum on target, and on the
+    set V' <= -c (|w|^2 + |q|^2). Both are shown for w = (v, 0, 0) and q = (t, n, 0)."""
     loop = AttitudeLoop(claim, quotients=True)
     yield from loop.sound()
     V, level = loop.lyapunov, claim.numbers["level"]
@@ -207,21 +208,21 @@ def converges_without_axes(claim: Claim) -> Proof:
 
 
 def without_quotients(loop: AttitudeLoop, p: Poly) -> Poly:
-    """Return p times its divisors, each as often as p has its inverse: a product that has the sign of p."""
+    """Return p times its divisors, each as often as its inverse occurs in p: a product with the sign of p."""
     for name, divisor in loop.divisors.items():
         p = horner(p.powers(name)[::-1], divisor)
     return p
 
 
 def turned(loop: AttitudeLoop, p: Poly, axis: int) -> Poly:
-    """Return the derivative of p where q and w are turned together about an axis."""
+    """Return the derivative of p as q and w are rotated together about an axis."""
     along = [poly(i == axis) for i in range(3)]
     vectors = [("q", loop.q[1:]), ("w", loop.w)]
     return total(p.slope(f"{x}{i}") * rate for x, vector in vectors for i, rate in enumerate(cross(along, vector), 1))
 
 
 def reduced(p: Poly) -> Poly:
-    """Return p at w = (v, 0, 0), q = (t, n, 0) and q0 = 1 - u, even in n, of which the square is u (2 - u) - t^2."""
+    """Return p at w = (v, 0, 0), q = (t, n, 0) and q0 = 1 - u, even in n, whose square is u (2 - u) - t^2."""
     u, v, t = map(var, "uvt")
     parts = p.at({"q0": 1 - u, "q1": t, "q3": 0, "w1": v, "w2": 0, "w3": 0}).powers("q2")
     demand(not any(part.terms for part in parts[1::2]), "a function of a direction has one side")

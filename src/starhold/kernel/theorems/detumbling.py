@@ -1,5 +1,5 @@
-"""The theorem about a law that opposes the change of the magnetic field: in which control periods the kinetic energy falls,
-by how much it rises at most in the others, and how often these are. Proof: docs/kernel.md, section 11."""
+"""The theorem about a law that opposes the change of the magnetic field: in which control periods the kinetic energy
+decreases, by how much it increases at most in the others, and how often those occur. Proof: docs/kernel.md, section 11."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ..sentences import Statement, above, below
 
 
 class Power(NamedTuple):
-    """Polynomials in m bound the power of a control period in which the field turns in the body at the mean rate m, of it
-    and the period before. `free`: with rods within their limit, with a negative coefficient of m^2. With rods at it the
-    power is no more than `others`, and where `free` is negative it is at most -c if `limited` is at least c `seen`."""
+    """Polynomials in m bound the power of a control period in which the field turns in the body at the mean rate m, over it
+    and the period before. `free`: with rods within their limit, with a negative coefficient of m^2. With rods at the limit
+    the power is at most `others`, and where `free` is negative it is at most -c if `limited` is at least c `seen`."""
 
     free: Poly
     others: Poly
@@ -84,8 +84,8 @@ def detumbles(claim: Claim) -> Proof:
 
 
 def opposes_change(loop: AttitudeLoop) -> Shown:
-    """Where there is a field b the law remembers it, and its torque is m x b with m = -k (b - b before)/(period |b|^2), or
-    none at the first measurement, before which no field is known."""
+    """With a field b the law remembers it, and its torque is m x b with m = -k (b - b before)/(period |b|^2), or none at the
+    first measurement, before which no field is known."""
     b, before, subject = variables("b"), variables("m"), loop.claim.subject
     # Of what else a law may be told a loop that is taken with nothing has less than one that flies.
     fields = {name.rpartition(".")[0] for name in loop.claim.programs["law"].inputs if name.startswith("measurement.")}
@@ -106,7 +106,7 @@ def opposes_change(loop: AttitudeLoop) -> Shown:
 
 
 def power_at(loop: AttitudeLoop, rate: Fraction) -> Power:
-    """Return what bounds the power of a period while the body turns no faster than a rate (rad/s)."""
+    """Return a bound of the power of a period while the body turns no faster than a rate (rad/s)."""
     numbers, subject, m = loop.claim.numbers, loop.claim.subject, var("m")
     k, h, low = subject["gains.k"], subject["measurement.period"], numbers["inertia.low"]
     change, outside, across = (numbers[name] for name in ("field.change", "outside", "outside.across"))

@@ -1,7 +1,7 @@
 """The theorems on invariant sets of a small system x' = f(x), by functions V. Proofs: docs/kernel.md, section 7.
 
-M is {V <= 0}, or an equilibrium. Where f jumps, x' is any mean of what the cells have there (Filippov). Parameters are
-inputs that stay, and have all values of their intervals.
+M is {V <= 0}, or an equilibrium. Where f jumps, x' is any convex combination of the values in the adjacent cells (Filippov).
+Parameters are constant inputs, with all values in their intervals.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from ..sentences import Statement, below
 
 @dataclass(frozen=True)
 class Function:
-    """A function V of a system (its place among them), the level up to which it is looked at (None: all of them), and the
-    sense in which it has to change: it falls (1) or grows (-1)."""
+    """A function V of a system (its index), the level up to which it is considered (None: all), and the required sense of
+    change: it decreases (1) or grows (-1)."""
 
     system: System
     place: int
@@ -31,7 +31,7 @@ class Function:
     sense: int = 1
 
     def hint(self, name: str) -> Any:
-        """Return what the evidence tells about this function, None if nothing."""
+        """Return the evidence's entry about this function, or None."""
         return self.system.claim.evidence.get(f"{name} of {self.system.roles[self.place]}")
 
     def hints(self, name: str) -> list[Any]:
@@ -48,7 +48,7 @@ class Function:
         return self.system.all[i].V[self.place]
 
     def positive(self, name: str, i: int) -> list[Poly]:
-        """Return what is positive together where V is: even powers of all variables, or a power of V."""
+        """Return polynomials that are together positive where V is: even powers of all variables, or a power of V."""
         powers = self.hint(name)
         if name != "shape" and type(powers) is int:
             return [power(self.on(i), powers)]
@@ -56,9 +56,9 @@ class Function:
         return [power(var(x) * var(x), n) for x, n in zip(self.system.names, powers, strict=True)]
 
     def confined(self, most: Fraction | int = 0) -> Shown:
-        """{V <= l} is compact and inside of the box for each l < level, and M is as told and not empty: V >= level all
-        over the border, and where there is none V is larger than even powers. Where V decreases as long as it is positive,
-        M is not empty if any state has V < level: it has what the least V is reached at."""
+        """{V <= l} is compact and inside the box for each l < level, and M is as stated and nonempty: V >= level on the
+        whole boundary or, without a boundary, V exceeds even powers. If V decreases while it is positive, M is nonempty if
+        any state has V < level: it contains the minimiser of V."""
         system = self.system
         demand(self.level is None or self.level > 0, "a level is not positive")
         if self.at_point:
@@ -75,7 +75,7 @@ class Function:
         yield from self.border(self.level or 0)
 
     def border(self, least: Fraction | int, strict: Sequence[Poly] = ()) -> Shown:
-        """V >= least all over the border of the box (strict: larger)."""
+        """V >= least on the whole boundary of the box (strict: larger)."""
         system = self.system
         for x in (name for name in system.names if name in system.box):
             for k, end in enumerate(system.box[x]):
@@ -83,9 +83,9 @@ class Function:
                     yield f"border {self.place} {i} {x} {k}", system.sum(self.on(i) - least, (i,), (), strict, face={x: end})
 
     def changes(self, strictly: bool = True) -> Shown:
-        """V decreases all the time where 0 < V < level, or (not strictly) does not grow there; or where it weakly decreases
-        a function E grows. Told are pairs of cells where it is weakly so, cells that hold no state with V > 0, and
-        surfaces across which rates differ, each with a cell i and the multiple of the surface that V_i is less."""
+        """V decreases wherever 0 < V < level, or (not strictly) is non-increasing there; or where it is weakly decreasing a
+        function E grows. Given are pairs of cells where it is weakly so, cells without a state with V > 0, and surfaces
+        across which rates differ, each with a cell i and the multiple of the surface by which V_i is smaller."""
         system, surfaces = self.system, self.system.surfaces
         escape, weakly = self.hint("escape"), [tuple(read_list(pair, 2)) for pair in self.hints("weakly")]
         across: list[tuple[Any, ...]] = [tuple(read_list(entry, 3)) for entry in self.hints("across")]
@@ -119,7 +119,7 @@ class Function:
                     yield from system.equal(f"agree {j} {k} {n}", p, (j, k))
 
     def where(self) -> str:
-        """Write the set that motions start from."""
+        """Write the set of starts of motions."""
         return "everywhere" if self.level is None else self.inside(f"{self.system.roles[self.place]} < {below(self.level)}")
 
     def inside(self, condition: str) -> str:
@@ -127,21 +127,21 @@ class Function:
         return f"{{{condition}}}" + " of the box" * bool(self.system.box)
 
     def limit(self) -> str:
-        """Write the set that motions come to."""
+        """Write the limit set of motions."""
         return "the equilibrium" if self.at_point else f"{{{self.system.roles[self.place]} <= 0}}"
 
 
 def stated(text: str, system: System) -> Statement:
-    """Return a statement about a system with what it assumes."""
+    """Return a statement about a system with its assumptions."""
     jumps = any(name.startswith("across") for name in system.claim.evidence.content)
     whatever = ", whatever the parameters in their intervals" if system.parameters else ""
     return Statement(text + whatever, ("equations-as-given", *(["filippov"] if jumps else [])))
 
 
 def attracts(claim: Claim) -> Proof:
-    """All motions from {V < level} stay there and come to M, which is stable (Lyapunov, LaSalle). With a `core`, a function
-    with a level of its own that shows this of {core < core.level}, and with {V <= 0} inside of that, they come to its M.
-    With a `start` it is said of the motions from {start >= 0}, which lies in {V < level}."""
+    """All motions from {V < level} stay there and converge to M, which is stable (Lyapunov, LaSalle). With a `core`, a
+    function with its own level that shows this for {core < core.level}, and with {V <= 0} inside that, they converge to its
+    M. With a `start` the statement is about the motions from {start >= 0}, which lies in {V < level}."""
     start, core = "start" in claim.programs, "core" in claim.programs
     system = System(claim, *["start"] * start, "V", *["core"] * core)
     yield from system.sound()
@@ -171,8 +171,8 @@ def stays(claim: Claim) -> Proof:
 
 
 def leaves(claim: Claim) -> Proof:
-    """M is unstable: V is positive at states as near to it as one likes, and grows wherever it is positive, so that motions
-    from these leave the box, in which it is bounded (Chetaev)."""
+    """M is unstable: V is positive at states arbitrarily near to it, and grows wherever it is positive, so motions from
+    these leave the box, in which V is bounded (Chetaev)."""
     system = System(claim, "V")
     yield from system.sound()
     V = Function(system, 0, None, -1)
@@ -201,8 +201,8 @@ def leaves(claim: Claim) -> Proof:
 
 
 def avoids(claim: Claim) -> Proof:
-    """No motion from {start >= 0} comes to {unsafe >= 0} (a barrier V): V <= 0 on the one and V > 0 on the other, neither of
-    them empty, and V' <= c V with a polynomial c, so that V <= 0 for ever (Gronwall)."""
+    """No motion from {start >= 0} reaches {unsafe >= 0} (a barrier V): V <= 0 on the one and V > 0 on the other, both
+    nonempty, and V' <= c V with a polynomial c, so V <= 0 for all time (Gronwall)."""
     system = System(claim, "start", "unsafe", "V")
     yield from system.sound()
     demand(not system.at_point, "there is no equilibrium in it")
@@ -220,7 +220,7 @@ def avoids(claim: Claim) -> Proof:
 
 
 def fails(claim: Claim) -> Proof:
-    """V is not as one of the theorems needs it, at a state. What of it is the word that the claim is taken with."""
+    """V violates a condition of one of the theorems at a state; the word of the claim names the condition."""
     system = System(claim, "V")
     cell, state = system.state("state")
     around = [cell for cell in system.all if cell.holds(state)]

@@ -19,10 +19,10 @@ TORQUE, UNIT = "torque-limit", variables("d")
 
 
 def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0), largest: Sequence[Fraction] | None = None) -> Proof:
-    """On {V <= level}, or everywhere, with everything from outside at most as told: each component of the torque is at most
-    `limit` in size (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k, of
-    those that are told. less: how far the torque is at most from that of the true state, by what is told wrongly. largest:
-    how large it is at most about each axis, errors included, where that is known."""
+    """On {V <= level}, or everywhere, with external inputs within their bounds: each component of the torque is at most
+    `limit` in size (`limit.norm`: their norm); each listed motor gives at most motors.k, each listed wheel stores at most
+    stored.k. less: a bound of the torque error due to wrong inputs of the law. largest: a bound of the torque about each
+    axis, errors included, if known."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
     limit, longest = numbers.get("limit"), numbers.get("limit.norm")
     count = next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
@@ -95,8 +95,8 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0), largest: Seq
 
 
 def loads(name: str, axis: Fraction | None, norm: Fraction | None) -> Iterator[tuple[str, Fraction, Row]]:
-    """Yield rows of which the product with u is at most `axis` where each component of u is, and `norm` where |u| is: every
-    unit vector d."""
+    """Yield rows whose product with u is at most `axis` for components of u within it, and at most `norm` for |u| within it:
+    all unit vectors d."""
     if axis is not None:
         yield from ((f"{name} {sign * (k + 1):+d}", axis, [sign * (i == k) for i in AXES]) for k in AXES for sign in (1, -1))
     if norm is not None:
@@ -106,7 +106,7 @@ def loads(name: str, axis: Fraction | None, norm: Fraction | None) -> Iterator[t
 def within(
     bound: Fraction, load: Poly, z: list[Poly], paired: Sequence[Poly], known: Sequence[Poly], modulo: list[Poly]
 ) -> Squares:
-    """Return that a load is at most its bound; terms that the unit vector of a norm is paired with are told."""
+    """Return the obligation that a load is at most its bound; `paired` are the terms for the unit vector of a norm."""
     if not UNIT[0].names <= load.names:
         return Squares(bound - load, z, 0, known, modulo)
     more = [*UNIT, *(d * x for d in UNIT for x in paired)]
@@ -119,7 +119,7 @@ def within(
 
 def allocated(loop: AttitudeLoop, motors: Most) -> tuple[Rows, list[Fraction]]:
     """Return for each wheel its share of the body's torque, and the momentum that it keeps whatever the body does: the rows
-    of L = -A'(AA')^-1 and p + Lh. A motor that is told to give nothing has no share."""
+    of L = -A'(AA')^-1 and p + Lh. A motor declared to give nothing has no share."""
     subject = loop.claim.subject
     axes = [[subject[f"wheel.{k}.axis.{i}"] for i in AXES] for k in range(len(motors))]
     driven = [axis if most != 0 else [Fraction(0)] * 3 for axis, most in zip(axes, motors, strict=True)]

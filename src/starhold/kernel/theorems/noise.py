@@ -27,7 +27,7 @@ from ..numbers import (
 from ..polynomials import var
 from ..programs import Exactly, known, single
 from ..reading import Claim
-from ..regions import AT_REST, RATE, STATE, TURN, Radii
+from ..regions import RATE, TURN
 from ..rules import Definite, Exceeds, Part
 from ..sentences import Statement, below
 
@@ -48,11 +48,11 @@ PLACES, FINE, SLIGHT = 100, 160, 40
 """Binary places of matrices and of covariances, and of the share by which rounding them widens these."""
 
 
-def within_radii(claim: Claim, motion: Held) -> Part[tuple[Statement, tuple[Radii, Radii]]]:
+def within_radii(claim: Claim, motion: Held) -> Part[Statement]:
     """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
     than noise.attitude and noise.rate, the random torque than noise.torque, other standard normal vectors no longer than
-    noise.beside, and the rate and the turn that the errors and this torque cause near the target no larger than those
-    returned, nor what momentum makes of these, but with a probability of `share` at most."""
+    noise.beside, and the rate and the turn, and the torque that lags, which the errors and this torque cause near the target
+    no larger than told, nor what momentum makes of these, but with a probability of `share` at most."""
     numbers = claim.numbers
     share, samples, every = (numbers[name] for name in (SHARE, "samples", "every"))
     demand(1 <= every <= MOST and every.denominator == samples.denominator == 1, "samples are not counted")
@@ -60,7 +60,7 @@ def within_radii(claim: Claim, motion: Held) -> Part[tuple[Statement, tuple[Radi
     roles = [CARRIED] * min(count - 1, 1) + [CORRECTED]
     errors = [linear(claim, role) for role in roles]
     rows = iter(read_list(claim.evidence["covariances"], count * len(spins)))
-    parts = parts_of(len(errors[0][0][0]), spins)
+    parts = parts_of(motion.near, len(errors[0][0][0]), spins)
     widths = [rational(x) for x in read_list(claim.evidence["deviations"], len(parts))]
     swayed = [rational(x) for x in read_list(claim.evidence["swayed"], len(parts) - 2)]
     for place, spin in enumerate(spins):
@@ -97,9 +97,8 @@ def within_radii(claim: Claim, motion: Held) -> Part[tuple[Statement, tuple[Radi
         f", of these errors up to {below(numbers['noise.attitude'])} rad and {below(numbers['noise.rate'])} rad/s driven by"
         f" noise{beside}: all this at {samples} samples on end with a probability of at least {below(1 - share)}"
     )
-    (wide, turned), apart = swayed[:2], swayed[2:]
-    both = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
-    return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate")), both
+    motion.sways(swayed)
+    return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate"))
 
 
 def spins_of(loop: AttitudeLoop) -> list[Spin | None]:
@@ -111,15 +110,19 @@ def spins_of(loop: AttitudeLoop) -> list[Spin | None]:
     return [spinning(loop, [most * (i == k) for i in AXES]) for k in AXES]
 
 
-def parts_of(size: int, spins: Sequence[Spin | None]) -> dict[str, list[slice]]:
+def parts_of(near: Near, size: int, spins: Sequence[Spin | None]) -> dict[str, list[slice]]:
     """Return the places of what noise drives, of which `size` are errors: of the errors that are told, and of the rate and
-    the turn that they cause; with wheels of both with and without momentum, and half of what differs."""
-    begun, count = size + (12 if spins[0] else 6), 2 if spins[0] else 1
-    where = {"attitude": [slice(begun, begun + 3)], "rate": [slice(begun + 3, begun + 6)]}
-    places = {"motion's rate": 0, "motion's turn": 3}
-    where |= {name: [slice(6 * k + first, 6 * k + first + 3) for k in range(count)] for name, first in places.items()}
-    apart = {"spun rate": begun + 6, "spun turn": begun + 9} if spins[0] else {}
-    return where | {name: [slice(first, first + 3)] for name, first in apart.items()}
+    the turn that they cause, and of a torque that lags; with wheels of all with and without momentum, and half of what
+    differs."""
+    wide, count = len(near.A), 2 if spins[0] else 1
+    begun, names = size + count * wide, ("rate", "turn", "torque")[: wide // 3]
+
+    def at(*places: int) -> list[slice]:
+        return [slice(place, place + 3) for place in places]
+
+    where = {"attitude": at(begun), "rate": at(begun + 3)}
+    where |= {f"motion's {name}": at(*(wide * k + 3 * i for k in range(count))) for i, name in enumerate(names)}
+    return where | {f"spun {name}": at(begun + 6 + 3 * i) for i, name in enumerate(names) if spins[0]}
 
 
 def driven(
@@ -136,8 +139,8 @@ def driven(
         return plus(times(rated, rows[size + 3 :]), times(turned, rows[size : size + 3]), Fraction(1, 2))
 
     pushed: Rows = [[random * x for x in row] if random else [] for row in near.B]
-    plain = [times(near.B, torque(rows)) for rows in (errors, noise)]
-    still = [[Fraction(0)] * len(STATE) for _ in errors]
+    plain = [times(near.commanded, torque(rows)) for rows in (errors, noise)]
+    still = [[Fraction(0)] * len(near.A) for _ in errors]
 
     def unpushed(rows: Rows) -> Rows:
         return [row + [Fraction(0)] * len(pushed[0]) for row in rows]
@@ -147,8 +150,8 @@ def driven(
     law, body = spin
 
     def more(rows: Rows) -> Rows:
-        grown = times(near.grown, times(body, times(near.inverse, torque(rows))))
-        return plus(times(near.B, times(law, rows[size + 3 :])), grown)
+        grown = times(near.grown, times(body, times(near.eased, torque(rows))))
+        return plus(times(near.commanded, times(law, rows[size + 3 :])), grown)
 
     # x of both signs is that without, half of their sum, and by its sign what momentum makes of that.
     half = [[x / 2 for x in row] for row in near.spun(law, body)]

@@ -12,7 +12,7 @@ from ..held import Held
 from ..loops import AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim, Numbers
-from ..regions import ANGLE, AT_REST, RATE, TURN, Tube, as_told, balls, widened
+from ..regions import ANGLE, AT_REST, RATE, TURN, Tube, as_told, balls
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
@@ -25,6 +25,8 @@ ROUNDS = 64
 
 NEARLY = Fraction(9, 8)
 """How near to what it comes down to is counted what is late."""
+SLIGHT = 1 << 14
+"""By how much what is late near the target is larger than what is left of that in larger sets, to be forgotten."""
 
 HALF_TURN = Fraction(314, 100)
 """At most a half turn (rad)."""
@@ -59,7 +61,7 @@ def points(claim: Claim) -> Proof:
         planned, torques = yield from motion.plan.keeps(region, (wrong["w"], wrong["q"]), as_told(region.sizes, wrong))
     off = motion.misread(region)[0] + motion.planned(region.sizes)
     behind_at_most = motion.behind(region.sizes).most
-    if WITHIN in numbers or motion.steady is None:
+    if WITHIN in numbers or not motion.inexact:
         # Its components change one by one, not towards what is asked for.
         off += behind_at_most
     if WITHIN in numbers:
@@ -69,12 +71,12 @@ def points(claim: Claim) -> Proof:
         yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
     tube = motion.tube(region)
     if motion.late and (change := motion.change_in(tube)):
-        yield "late torque", Exceeds(motion.late.rest, change.settled(tube, False))
+        yield "late torque", Exceeds(motion.late.rest, change.settled)
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * motion.swing(tube))
     noise = Statement("", ())
     demand(motion.random == 0 or (SHARE in numbers and DEVIATION in numbers), "a random torque has no share")
     if SHARE in numbers:
-        noise, (motion.swayed, motion.apart) = yield from within_radii(claim, motion)
+        noise = yield from within_radii(claim, motion)
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
     demand(bool(levels), "no level is told")
     within = [(Fraction(0), tube.sizes[ANGLE])]
@@ -92,20 +94,26 @@ def points(claim: Claim) -> Proof:
         within.append((h * samples, tube.sizes[ANGLE]))
     last, beside, corners = tube.region.X, AT_REST, motion.corners()
     away = motion.away
+    motion.nears(tube)
+    entered = motion.entered(tube)
     for k, one in enumerate(ellipsoids):
         tube, more = forgotten(motion, tube)
         samples += more
         shape, parts, *rest = read_table(one, "shape", "shares", "rate", "reach")
-        X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
+        X, shares, (rate, reach) = (
+            matrix(shape, len(entered), len(entered)),
+            [rational(x) for x in read_list(parts, 3)],
+            map(rational, rest),
+        )
         free = 1 - sum(shares, Fraction(0))
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
         left = plus([[rate * x for x in row] for row in X], spread(shares, motion.linear(tube)), -1)
         for corner, A in enumerate(corners):
             yield f"ellipsoid {k} {corner}", Definite(plus(left, times(A, times(X, transpose(A))), Fraction(-1) / free))
-        yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(tube.region.X, away), -1))
+        yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], entered, -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
-        tube, last, beside = motion.tube(tube.region.within(X, away)), X, away
+        tube, last, entered, beside = motion.tube(tube.region.within(X, away)), X, X, away
         within.append((h * samples, tube.sizes[ANGLE]))
     if (summed := claim.evidence.get("response")) is not None:
         rounds, weights, gains = read_table(summed, "rounds", "weights", "gains")
@@ -133,8 +141,7 @@ def points(claim: Claim) -> Proof:
     begun = "V <= " + below(numbers["level"] - behind) + ", q0 > 0" * motion.even
     text = bounded_motion(numbers, begun, "", misread)
     text += f", the torque that acts late, {motion.late.in_words}" if motion.late else ""
-    if motion.steady:
-        text += f", in all components alike, and by no less than {' and '.join(map(above, motion.alike))} times"
+    text += motion.alike_in_words
     text += f", at no time by {above(numbers[WITHIN])} N m" if WITHIN in numbers else ""
     text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
     text += f", with every J_ik off by up to {below(numbers['tolerance'])} sqrt(J_ii J_kk)" if motion.off else ""
@@ -150,7 +157,7 @@ def points(claim: Claim) -> Proof:
         *limited.assumptions,
     ]
     assumed += ["best-plan"] * bool(planned) + ["late-torque"] * bool(motion.late)
-    assumed += ["late-alike"] * bool(motion.steady)
+    assumed += ["late-alike"] * bool(motion.inexact)
     assumed += loop.untold + ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
@@ -181,7 +188,7 @@ def bounded_motion(numbers: Numbers, begun: str, more: str, misread: Sequence[tu
 def spread(shares: Sequence[Fraction], pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:
     """Return what the sum of B v, |v| <= b, adds to the matrix AXA' / (1 - the sum of shares) of an ellipsoid that holds
     Ax + that, of x.X^-1 x <= 1."""
-    grown = scalar(0, 6)
+    grown = scalar(0, len(pushes[0][0]))
     for (B, b), share in zip(pushes, shares, strict=True):
         grown = plus(grown, times(B, transpose(B)), b * b / share)
     return grown
@@ -196,17 +203,24 @@ def on_level(motion: Held, c: Fraction) -> tuple[Tube, int]:
     return tube, samples
 
 
-def forgotten(motion: Held, tube: Tube, whole: bool = True) -> tuple[Tube, int]:
+def forgotten(motion: Held, tube: Tube, near: bool = True) -> tuple[Tube, int]:
     """Return the tube from when what was late in larger sets is forgotten, or the b of it, and after how many periods that
     is."""
-    if (change := motion.change_in(tube, whole)) is None:
+    if (late := motion.late) is None:
         return tube, 0
-    sizes, floor = tube.region.sizes, change.settled(tube, whole, motion.leant)
-    linear = motion.steady_part(tube) if whole else Fraction(0)
-    begun, end = sizes[REST] + whole * (sizes[FIRST] + linear), NEARLY * floor
-    samples = periods(1 - change.kept, floor, begun, end) if end < begun else 0
-    sizes = sizes | {REST: min(begun, end), FIRST: linear if whole else sizes[FIRST]}
-    return motion.tube(replace(tube.region, sizes=sizes)), samples
+    sizes = tube.region.sizes
+    if near:
+        linear, rest = motion.lateness(tube)
+        left = (linear + rest) / SLIGHT
+        samples = periods(1 - late.kept, Fraction(0), sizes[FIRST] + sizes[REST] + motion.unsettled, left)
+        late_by = {FIRST: linear, REST: rest + left}
+    else:
+        change = motion.change_in(tube)
+        assert change is not None
+        begun, end = sizes[REST], NEARLY * change.settled
+        samples = periods(1 - change.kept, change.settled, begun, end)
+        late_by = {REST: min(begun, end)}
+    return motion.tube(replace(tube.region, sizes=sizes | late_by)), samples
 
 
 def periods(fall: Fraction, floor: Fraction, start: Fraction, end: Fraction) -> int:

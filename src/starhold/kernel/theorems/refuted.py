@@ -1,8 +1,8 @@
-"""Theorems that refute: what a claim needs is shown to fail at one exact state. Proofs: docs/kernel.md, 9.
+"""Theorems that refute: a condition of a claim is shown to fail at one exact state. Proofs: docs/kernel.md, 9.
 
-A state is told by coordinates: t (turn.k), which is q = (1 - |t|^2, 2t)/(1 + |t|^2) with |t| <= 1, so that q0 >= 0 whichever
-way the quaternion's sign is chosen, and w (rate.k). Nothing acts from outside but where that is said, the target is at rest
-and no wheels turn: all claims hold of such a loop too.
+A state is given by coordinates: t (turn.k), for q = (1 - |t|^2, 2t)/(1 + |t|^2) with |t| <= 1, so that q0 >= 0 for every
+choice of the quaternion's sign, and w (rate.k). Unless stated there is no external torque, the target is at rest and no
+wheels turn: all claims hold for such a loop too.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class State:
 
     def leading(self, p: Poly) -> Fraction:
         """Return the first coefficient of p at the states (st, sw) as s grows from zero, which has the sign of p at all of
-        them that are near the target. Up to s^2 q is (1 - 2 |t|^2 s^2, 2ts)."""
+        them near the target. To order s^2, q is (1 - 2 |t|^2 s^2, 2ts)."""
         s = var("s")
         way = {f"q{k}": 2 * x * s for k, x in enumerate(self.t, 1)} | {f"w{k}": x * s for k, x in enumerate(self.w, 1)}
         terms = p.at(way | {"q0": 1 - sum(2 * x * x for x in self.t) * s * s}).terms
@@ -59,7 +59,7 @@ class State:
 
 
 def torque(loop: AttitudeLoop, state: State) -> list[Fraction]:
-    """Return what the law asks for at a state."""
+    """Return the torque demanded by the law at a state."""
     here = {name: p.at(state.values) for name, p in loop.inputs.items()}
     return [p.number for p in loop.single("law", 3, here)]
 
@@ -70,7 +70,7 @@ def slope(loop: AttitudeLoop, u: Sequence[Poly]) -> Poly:
 
 
 def rises(claim: Claim) -> Proof:
-    """V' > 0 at a state, with |w| <= `fastest` if that is told."""
+    """V' > 0 at a state, with |w| <= `fastest` if that is given."""
     loop, state = AttitudeLoop(claim), State.read(claim)
     yield from loop.sound()
     fastest = claim.numbers.get("fastest")
@@ -80,7 +80,7 @@ def rises(claim: Claim) -> Proof:
 
 
 def rises_near_target(claim: Claim) -> Proof:
-    """V' > 0 at a state, and at such states as near the target as one likes: no set {V <= level} is kept for it."""
+    """V' > 0 at states arbitrarily near the target: V is non-increasing on no set {V <= level}."""
     yield from rises(claim)
     loop, state = AttitudeLoop(claim), State.read(claim)
     u = [around(cases, loop.on_target | loop.still).value for cases in loop.law]
@@ -89,7 +89,7 @@ def rises_near_target(claim: Claim) -> Proof:
 
 
 def is_negative(claim: Claim) -> Proof:
-    """V < 0 at a state, and at such states as near the target as one likes, where it is zero."""
+    """V < 0 at states arbitrarily near the target, where it is zero."""
     loop, state = AttitudeLoop(claim), State.read(claim)
     yield from loop.sound()
     yield "V is least on target", Exceeds(-loop.lyapunov.at(state.values).number)
@@ -98,8 +98,8 @@ def is_negative(claim: Claim) -> Proof:
 
 
 def exceeds_limit(claim: Claim) -> Proof:
-    """The torque exceeds its limit at a state where V is no larger than at a rest turned by at most `angle`: every set
-    {V <= level} that holds those rests holds the state."""
+    """The torque exceeds its limit at a state where V is no larger than at a rest turned by at most `angle`: every set {V <=
+    level} that contains those rests contains the state."""
     loop, state, rest = AttitudeLoop(claim), State.read(claim), State.read(claim, "rest", None)
     yield from loop.sound()
     numbers = claim.numbers
@@ -115,7 +115,7 @@ def exceeds_limit(claim: Claim) -> Proof:
 
 
 def does_not_settle(claim: Claim) -> Proof:
-    """Near rest, with the torque held for the period, some motions do not come to rest."""
+    """Near rest, with the torque held for the period, some motions do not converge to rest."""
     (*_, step), h = (yield from linear_loop(claim)), claim.numbers["period"]
     yield "step", Persists(step(h))
     text = f"near rest, with the torque held for {below(h)} s, some motions do not come to rest"
@@ -123,8 +123,8 @@ def does_not_settle(claim: Claim) -> Proof:
 
 
 def is_pushed_off(claim: Claim) -> Proof:
-    """A torque from outside of `outside.i` exceeds what the law switches about axis i: it pushes s_i away from zero, as at a
-    state where s_i > 0."""
+    """An external torque of `outside.i` exceeds the law's switching torque about axis i: it drives s_i away from zero, as at
+    a state where s_i > 0."""
     loop, state = AttitudeLoop(claim), State.read(claim)
     s, _, moved = yield from declared(loop)
     i = next((i for i in AXES if f"outside.{i}" in claim.numbers), 0)
@@ -136,7 +136,7 @@ def is_pushed_off(claim: Claim) -> Proof:
 
 
 def leads_away(claim: Claim) -> Proof:
-    """On the surface w = -Kq, where q0' = q.Kq/2, q0 falls at a state, and at all on its way to the target."""
+    """On the surface w = -Kq, where q0' = q.Kq/2, q0 decreases at a state, and at all states between it and the target."""
     loop, state = AttitudeLoop(claim), State.read(claim, "turn", None)
     _, K, _ = yield from declared(loop)
     q = [Poly({(): state.values[f"q{k}"]}) for k in (1, 2, 3)]

@@ -50,6 +50,7 @@ class Response:
         first, last, turn = (b for _, b in motion.linear(tube, begun[0], pulled))
         pushes = first, max(last - first, Fraction(0)), turn
         sizes = [min(region_sizes[name] + away[i // 3], begun[i // 3]) for i, name in enumerate(STATE)]
+        sizes += [motion.applied] * (len(motion.near.A) - len(STATE))
         wide, turned, pulled = (
             up(sum((gain * b for gain, b in zip(gains, pushes, strict=True)), norm(reach(self.left[part], sizes))))
             for gains, part in zip(self.gains, PARTS.values(), strict=True)
@@ -68,12 +69,14 @@ def responds(motion: Held, weights: Any, gains: Any) -> Part[Response]:
     """The gains are no less than those of the loop. weights: m_k, for each part of what is bounded. Of the sum x of
     C_k B v_k (y.x)^2 is no more than the sum of 1/m_k times that of m_k |B'C_k'y|^2 (Cauchy and Schwarz)."""
     (A, below), (B, under) = columns(motion.near.A), columns(reduce(beside, motion.ways))
+    # What C_0 is of (w, q): the torque that acts late is in none of them.
+    first = [row + [Fraction(0)] * (len(motion.near.A) - len(STATE)) for row in scalar(1, 6) + motion.near.rates]
     count = len(read_list(read_list(weights, len(PARTS))[0]))
     demand(0 < count <= MOST, "a response has no samples, or too many")
     weighed = [read_list(one, count) for one in weights]
     most = [list(map(rational, read_list(one, len(motion.ways)))) for one in read_list(gains, len(PARTS))]
     demand(all(type(m) is int and m > 0 for chosen in weighed for m in chosen), "a weight is not a whole number")
-    rows = [[(x.numerator << PLACES) // x.denominator for x in row] for row in scalar(1, 6) + motion.near.rates]
+    rows = [[(x.numerator << PLACES) // x.denominator for x in row] for row in first]
     sums = [[[[0] * 3 for _ in range(3)] for _ in motion.ways] for _ in weighed]
     for k in range(count):
         Account.spend(160, 3 * PLACES)
@@ -87,10 +90,10 @@ def responds(motion: Held, weights: Any, gains: Any) -> Part[Response]:
         rows = carried(rows, A, below)
     # What is rounded off, in each entry, all the while.
     off = Fraction(count + 1, 1 << PLACES)
-    for name, chosen, (first, last, turn), gains in zip(PARTS, weighed, sums, most, strict=True):
+    for name, chosen, (begin, last, turn), gains in zip(PARTS, weighed, sums, most, strict=True):
         share = Fraction(sum(-(-(1 << PLACES) // m) for m in chosen), 1 << 3 * PLACES)
         # (|a| + |b|)^2 <= 2 (|a|^2 + |b|^2)
-        both = [[2 * (x + y) for x, y in zip(*rows, strict=True)] for rows in zip(first, last, strict=True)]
+        both = [[2 * (x + y) for x, y in zip(*rows, strict=True)] for rows in zip(begin, last, strict=True)]
         for place, (total, gain) in enumerate(zip((both, last, turn), gains, strict=True)):
             demand(gain > 6 * off, "a gain is too small")
             weighted = [[share * x for x in row] for row in total]

@@ -14,7 +14,7 @@ from ..sentences import Statement, above, below
 
 
 def linear_loop(claim: Claim) -> Part[tuple[AttitudeLoop, tuple[Rows, Rows], Callable[[Fraction], Rows]]]:
-    """Return the loop near rest on target, with u = -Cw - Kq: it, C and K, and the matrix of a step of a period."""
+    """Return the loop near rest on target, with u = -Cw - Kq: the loop, C and K, and the matrix of one period."""
     loop = AttitudeLoop(claim, quotients=True)
     demand(not claim.taken.content, "the loop is taken with nothing")
     yield from loop.sound()
@@ -28,8 +28,8 @@ def linear_loop(claim: Claim) -> Part[tuple[AttitudeLoop, tuple[Rows, Rows], Cal
 
 
 def sampled(claim: Claim) -> Proof:
-    """Near rest on target the loop with the torque held for the period is stable, with all eigenvalues no larger than the
-    radius; with `longest` it is stable for every period up to that, with `other` for that period too."""
+    """Near rest on target the loop with the torque held for the period is stable, with all eigenvalues within the radius;
+    with `longest` it is stable for every period up to that, with `other` for that period too."""
     loop, (C, K), step = yield from linear_loop(claim)
     numbers, J = claim.numbers, loop.given
     h, radius, longest, other = numbers["period"], numbers["radius"], numbers.get("longest"), numbers.get("other")

@@ -1,4 +1,4 @@
-"""The theorem that a sliding-mode law reaches its surface, and what becomes of the motion then. Proof: docs/kernel.md, 6."""
+"""The theorem that a sliding-mode law reaches its surface, and what follows for the motion. Proof: docs/kernel.md, 6."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from .attitude import contents
 
 
 class Axis(NamedTuple):
-    """(J s')_i - e_i is -reach sign(s_i) at most, or where `slope` is told -slope s_i within a boundary layer."""
+    """(J s')_i - e_i is at most -reach sign(s_i), or, if `slope` is given, -slope s_i within a boundary layer."""
 
     reach: Fraction
     slope: Fraction | None
 
 
 def reaches_surface(claim: Claim) -> Proof:
-    """The motion reaches s = w + Kq = 0 in a finite time, against any torque from outside that is at most as told, and
-    slides to rest on target; with a boundary layer it ends within |s| <= surface, and so near the target."""
+    """The motion reaches s = w + Kq = 0 in finite time, against any external torque within its bounds, and slides to rest on
+    target; with a boundary layer it ends within |s| <= surface, and so near the target."""
     loop, numbers = AttitudeLoop(claim), claim.numbers
     vector, J = loop.q[1:], loop.given
     s, K, moved = yield from declared(loop)
@@ -55,7 +55,7 @@ def reaches_surface(claim: Claim) -> Proof:
 
 
 def declared(loop: AttitudeLoop) -> Part[tuple[list[Poly], Rows, list[Poly]]]:
-    """Show that the law's surface is s = w + Kq, and return s, K, and J s' less the torques of the law and from outside."""
+    """Show that the law's surface is s = w + Kq, and return s, K, and J s' without the law's and the external torques."""
     yield from loop.sound()
     s = loop.single("surface", 3)
     K = slopes(s, TURNS)
@@ -66,8 +66,8 @@ def declared(loop: AttitudeLoop) -> Part[tuple[list[Poly], Rows, list[Poly]]]:
 
 
 def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
-    """Return the axis: in each case of the law (J s')_i - e_i, its torque and what is moved, is a
-    number against the sign of s_i, or -slope s_i."""
+    """Return the axis: in each case of the law (J s')_i - e_i, its torque and the moved terms, is a number against the sign
+    of s_i, or -slope s_i."""
     reaches, linear = list[Fraction](), list[Fraction]()
     for case in loop.law[i]:
         change = case.value + moved
@@ -83,7 +83,7 @@ def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
 
 
 def on_side(case: Case, s: Poly) -> bool:
-    """Tell whether a case says that s > c with a c that is not negative."""
+    """Tell whether a case implies s > c with a nonnegative c."""
     multiples = (multiple(Poly(dict(p)), s) for p, truth in case.guards if truth)
     return any(factor > 0 and offset <= 0 for factor, offset in multiples)
 
@@ -95,7 +95,7 @@ def on_surface(case: Case, s: Poly) -> bool:
 
 
 def losses(loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction]) -> Part[Fraction]:
-    """Show that s.Js/2 falls outside of the box |s_i| <= far_i, and return what s.Js is at most in it."""
+    """Show that s.Js/2 decreases outside the box |s_i| <= far_i, and return the largest s.Js in it."""
     numbers, squares = loop.claim.numbers, Fraction(0)
     gain = sum((m * m / (4 * slope) for (_, slope), m in zip(axes, outside, strict=True) if slope is not None), Fraction(0))
     for i, ((reach, slope), m) in enumerate(zip(axes, outside, strict=True)):
@@ -108,7 +108,7 @@ def losses(loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction]) -> Par
 
 
 def ending_in_the_layer(loop: AttitudeLoop, most: Fraction, J: Rows, K: Rows) -> Part[str]:
-    """Show where motions end in a boundary layer, in which s.Js is at most so much."""
+    """Show the ultimate bound of motions in a boundary layer in which s.Js is at most so much."""
     numbers = loop.claim.numbers
     k, steep, size, angle = (numbers[name] for name in ("surface.low", "surface.high", "surface", "end.angle"))
     demand(angle < 3, "an angle is too large")

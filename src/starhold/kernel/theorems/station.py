@@ -1,6 +1,7 @@
-"""Theorems of keeping a station near a libration point. Proofs: docs/kernel.md, section 8.
+"""Theorems about station keeping near a libration point. Proofs: docs/kernel.md, section 8.
 
-All are about the loop of `points`. Assumed of every one: two bodies on circles, a known state, control without lag."""
+All are about the loop of `points`, and assume two bodies on circles, a known state, and control without lag.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +22,8 @@ from .limits import loads, within
 
 @dataclass(frozen=True)
 class Circle:
-    """The circle y^2 + z^2 = square, y' = -rate z, z' = rate y, and V = weights.(f1^2, f2^2, f3^2) of the errors
-    f1 = y^2 + z^2 - square, f2 = y' + rate z, f3 = z' - rate y. `size` and `inverse` name |(f2, f3)| where that is asked."""
+    """The circle y^2 + z^2 = square, y' = -rate z, z' = rate y, and V = weights.(f1^2, f2^2, f3^2) of the errors f1 = y^2 +
+    z^2 - square, f2 = y' + rate z, f3 = z' - rate y. `size` and `inverse` name |(f2, f3)| where the law uses it."""
 
     errors: list[Poly]
     square: Fraction
@@ -42,18 +43,18 @@ class Circle:
         return {"v2": -self.rate * var("x3"), "v3": self.rate * var("x2")}
 
     def met(self, p: Poly) -> Poly:
-        """Return p with the size n written as s n^2, which it is where n > 0."""
+        """Return p with the size n written as s n^2, its value where n > 0."""
         wrong = self.errors[1:]
         return p.at({self.size: var(self.inverse) * dot(wrong, wrong)})
 
     def bounds(self, side: Case) -> list[tuple[Fraction, Fraction]]:
-        """Return what a side says of the size n: n >= c for each f > 0 and c, n <= c for each f < 0 and c."""
+        """Return the bounds that a side gives for the size n: n >= c for each f > 0 and c, n <= c for each f < 0 and c."""
         return [multiple(var(self.size), p) for p in side.known]
 
 
 def ends_on_circle(claim: Claim) -> Proof:
-    """Every motion from {V <= level} ends on the circle, with x = 0. The set holds circles between two radii, and errors of
-    the velocity; on it the control is limited."""
+    """Every motion from {V <= level} converges to the circle, with x = 0. The set contains circles between two radii, and
+    errors of the velocity; on it the control is limited."""
     loop, numbers = PointLoop(claim), claim.numbers
     circle = yield from weighed(loop)
     c, heavy = circle.square, circle.weights[0]
@@ -73,7 +74,7 @@ def ends_on_circle(claim: Claim) -> Proof:
 
 
 def declared(loop: PointLoop) -> Part[Circle]:
-    """The law's errors are those of a circle."""
+    """Show that the law's errors are those of a circle."""
     errors = loop.single("errors", 3)
     square, rate = -errors[0].at({"x2": 0, "x3": 0}).number, errors[1].slope("x3").number
     (_, y, z), (_, v, w) = loop.x, loop.v
@@ -84,7 +85,7 @@ def declared(loop: PointLoop) -> Part[Circle]:
 
 
 def weighed(loop: PointLoop) -> Part[Circle]:
-    """The circle is run through, and V is a positive sum of the squares of its errors."""
+    """Show that the circle is a motion, and that V is a positive sum of the squares of its errors."""
     circle = yield from declared(loop)
     (V,) = loop.single("lyapunov", 1)
     weights = [V.terms.get(m, Fraction(0)) for m in (("x2",) * 4, ("v2",) * 2, ("v3",) * 2)]
@@ -96,8 +97,8 @@ def weighed(loop: PointLoop) -> Part[Circle]:
 
 
 def falls(loop: PointLoop, circle: Circle) -> Shown:
-    """V' <= -c (f2^2 + f3^2) on the one side of the law that holds the circle, V' <= -c on each other one, where the law is
-    bounded; on the circle alone f2 = f3 = 0 for all time, and x returns."""
+    """V' <= -c (f2^2 + f3^2) in the case of the law that holds on the circle, V' <= -c in all others, in which the law is
+    bounded; f2 = f3 = 0 for all time only on the circle, and x returns."""
     wrong = circle.errors[1:]
     near = [side for side in loop.sides if circle.inverse not in loop.depends_on(side)]
     demand(len(near) == 1, "not one side of the law holds the circle")
@@ -117,7 +118,7 @@ def falls(loop: PointLoop, circle: Circle) -> Shown:
 
 
 def clear_of_bodies(loop: PointLoop, circle: Circle, level: Fraction) -> Shown:
-    """Where V <= level every root and quotient has a value: y^2 + z^2 is above clear^2, and there radicands are positive."""
+    """Where V <= level every root and quotient is defined: y^2 + z^2 exceeds clear^2, and radicands are positive there."""
     roots = {name: p for name, p in loop.radicands.items() if name != circle.size}
     if roots or loop.ring.divisors:
         square = loop.claim.numbers["clear"] ** 2
@@ -130,7 +131,7 @@ def clear_of_bodies(loop: PointLoop, circle: Circle, level: Fraction) -> Shown:
 
 
 def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Part[str]:
-    """On {V <= level} with x = x' = 0, which is not left, the norm of the control is at most `limit.norm`, each axis of it
+    """On {V <= level} with x = x' = 0, which is invariant, the norm of the control is at most `limit.norm`, each axis of it
     `limit.axis`. The errors f are variables; where |(f2, f3)| = 1/s, s (f2, f3) is a unit vector."""
     norm, axis = loop.claim.numbers.get("limit.norm"), loop.claim.numbers.get("limit.axis")
     f, (_, y, z) = variables("f"), loop.x
@@ -159,8 +160,8 @@ def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Part[str]:
 
 
 def comes_to_rest(claim: Claim) -> Proof:
-    """Every motion comes to rest where the law says: there the acceleration is zero, it is linear, and all of its
-    eigenvalues have negative real parts."""
+    """Every motion converges to the law's rest: the acceleration is zero there, it is linear, and all of its eigenvalues
+    have negative real parts."""
     loop = PointLoop(claim)
     motion, at = only_side(loop), resting(loop)
     yield from vanish("rest is one", [p.at(at) for p in motion], first=1)
@@ -171,20 +172,20 @@ def comes_to_rest(claim: Claim) -> Proof:
 
 
 def only_side(loop: PointLoop) -> list[Poly]:
-    """Return the acceleration under a law that does not switch, in which roots and quotients cancel."""
+    """Return the acceleration under a law without switching, in which roots and quotients cancel."""
     demand(len(loop.sides) == 1, "the law switches")
     demand(loop.depends_on(loop.sides[0]) <= {*STATE}, "the motion depends on more than the state")
     return loop.acceleration(loop.sides[0])
 
 
 def resting(loop: PointLoop) -> Mapping[str, Fraction]:
-    """Return the state of rest that the law is for."""
+    """Return the state of rest of the law."""
     return dict.fromkeys(STATE, Fraction(0)) | {f"x{k}": p.number for k, p in enumerate(loop.single("rest", 3), 1)}
 
 
 def returns_with_limited_control(claim: Claim) -> Proof:
-    """With y and z held at rest and each axis of the control within the limit, motions with |S| <= width and |x| <= reach,
-    S = x + x'/s, s^2 the slope of the field, stay there and come to x = 0; from |S| >= boundary none does."""
+    """With y = z = 0 maintained and each axis of the control within the limit, motions with |S| <= width and |x| <= reach, S
+    = x + x'/s, s^2 the slope of the field, stay there and converge to x = 0; from |S| >= boundary none does."""
     loop, numbers = PointLoop(claim), claim.numbers
     limit, width, reach, boundary = (numbers[name] for name in ("limit", "width", "reach", "boundary"))
     low, high, x, v = numbers["root.low"], numbers["root.high"], loop.x[0], loop.v[0]
@@ -210,8 +211,8 @@ def returns_with_limited_control(claim: Claim) -> Proof:
 
 
 def clipped(loop: PointLoop, limit: Fraction) -> Shown:
-    """The limit lets act along X, of all between -limit and limit, what is nearest to what is asked, t: that has
-    (t - acts)(w - acts) <= 0 for w = -limit and limit."""
+    """Along X the limit passes the value between -limit and limit nearest to the demand t: it satisfies (t - acts)(w - acts)
+    <= 0 for w = -limit and limit."""
     t = variables("t")
     for k, case in enumerate(loop.read("limited", 3, wired("command", t), {"limit": poly(limit)})[0]):
         known, acts, asks = case.known, case.value, t[0]
@@ -222,7 +223,7 @@ def clipped(loop: PointLoop, limit: Fraction) -> Shown:
 
 
 def needs_more_control(claim: Claim) -> Proof:
-    """The law asks for more than its limit at a place of the circle itself."""
+    """The law demands more than its limit at a point of the circle itself."""
     loop, numbers = PointLoop(claim), claim.numbers
     circle = yield from declared(loop)
     y, z, control = numbers.coordinate("y"), numbers.coordinate("z"), numbers["control"]
@@ -241,8 +242,8 @@ def needs_more_control(claim: Claim) -> Proof:
 
 
 def does_not_return(claim: Claim) -> Proof:
-    """An axis moves on its own, as x'' = ax + bx' + c with a >= 0 or b >= 0: some motions along it, as near as one likes to
-    one that is wanted, stay away. A law with the errors of a circle is for that."""
+    """An axis moves on its own, as x'' = ax + bx' + c with a >= 0 or b >= 0: some motions along it, arbitrarily near to a
+    wanted one, do not return. This applies to a law with the errors of a circle."""
     loop = PointLoop(claim)
     label = "equilibrium" if claim.programs.get("errors") is None else "circle"
     motions = [loop.acceleration(side) for side in loop.sides]
@@ -258,8 +259,8 @@ def does_not_return(claim: Claim) -> Proof:
 
 
 def holds_another_circle(claim: Claim) -> Proof:
-    """A relay without a layer, which takes k (f2, f3)/|(f2, f3)| off, holds another circle: where f2 = f3 = 0 its Filippov
-    set has all of the size k and less, and to stay there takes g |f1| r."""
+    """A relay without a boundary layer, which subtracts k (f2, f3)/|(f2, f3)|, maintains another circle: where f2 = f3 = 0
+    its Filippov set contains all vectors up to the size k, and staying there takes g |f1| r."""
     loop, numbers = PointLoop(claim), claim.numbers
     circle = yield from declared(loop)
     radius, needs, of = numbers["radius"], numbers["needs"], numbers["of"]

@@ -40,8 +40,9 @@ def fastest(params: Params) -> float:
 
 def late(params: Params, period: float) -> Late:
     """How late the output is: its distance from the command falls exponentially, while it is within the rate limit."""
-    kept = math.exp(-period / params.lag)
-    return Late(kept, params.lag / period * -math.expm1(-period / params.lag), params.lag * params.rate_limit, alike=True)
+    kept, share = math.exp(-period / params.lag), params.lag / period
+    mean = share * -math.expm1(-period / params.lag)
+    return Late(kept, mean, params.lag * params.rate_limit, share * (1.0 - mean))
 
 
 def examples() -> list[Params]:

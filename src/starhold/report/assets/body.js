@@ -1,18 +1,18 @@
-// The turning body, one view for each law: hub, panels and axes as polygons drawn from back to front.
+// The rotating body, one view per law: hub, panels and axes are polygons, drawn from back to front.
 "use strict";
 
 const views = [...document.querySelectorAll(".view")].map((box, law) => ({
   canvas: box.querySelector("canvas"), angle: box.querySelector("output"), frames: scene.attitudes[law],
 }));
 
-// q v q*: from body to target components.
+// Computes q v q*, which takes body components to target components.
 function turn(q, v) {
   const u = [q[1], q[2], q[3]];
   const t = cross(u, v).map((c) => 2 * c);
   return plus(plus(v, t, q[0]), cross(u, t));
 }
 
-// Between two frames, the shorter way.
+// Interpolates between two frames along the shorter way.
 function between(frames, where) {
   const k = Math.min(Math.floor(where), frames.length - 1);
   const a = frames[k];
@@ -24,7 +24,7 @@ function between(frames, where) {
   return q.map((c) => c / size);
 }
 
-// Corners of a box between two opposite corners, in principal axes, as six faces seen from outside.
+// Returns the six faces of a box, given by two opposite corners in principal axes; corners run counter-clockwise from outside.
 function faces(low, high, colours) {
   return [0, 1, 2].flatMap((axis) => [-1, 1].map((way) => {
     const [i, j] = way > 0 ? [(axis + 1) % 3, (axis + 2) % 3] : [(axis + 2) % 3, (axis + 1) % 3];
@@ -67,7 +67,7 @@ let model = craft();
 // Principal axes are the columns of scene.axes.
 const toBody = (p) => [0, 1, 2].map((i) => dot(scene.axes[i], p));
 
-// Where the Earth is at a frame, in the axes of the target.
+// The direction of the Earth at a frame, in target axes.
 function toEarth(where) {
   const k = Math.min(Math.floor(where), scene.earth.length - 1);
   const b = scene.earth[Math.min(k + 1, scene.earth.length - 1)];
@@ -76,7 +76,7 @@ function toEarth(where) {
   return mixed.map((c) => c / size);
 }
 
-// The third axis of the orbital frame leads to the Earth, so down: all is seen turned by half a turn about the first.
+// The third axis of the orbital frame points at the Earth, down in the picture, so the view is half a turn about the first axis.
 const upright = (view) => (scene.down
   ? Object.fromEntries(Object.entries(view).map(([name, v]) => [name, [v[0], -v[1], -v[2]]])) : view);
 
@@ -95,7 +95,7 @@ function paint(view, where) {
   const { away, right, up } = upright(stance());
   const lamp = plus(plus(away, up, 0.6), right, -0.5).map((c) => c / 1.27);
   const scale = Math.min(width - 30, 0.95 * height - 24) * (scene.down ? 0.33 : scene.earth ? 0.31 : 0.385);
-  // Off the middle, for the target's axes have only one half each; the Earth may be anywhere.
+  // The view is off centre, because only the positive half of each target axis is drawn; the Earth may be anywhere.
   const flat = (p) => [width / 2 + scale * dot(p, right), (scene.down ? 0.37 : scene.earth ? 0.51 : 0.56) * height - scale * dot(p, up)];
 
   function line(from, to, colour, thick, dash) {
@@ -122,7 +122,7 @@ function paint(view, where) {
   const unit = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
   const names = ["x", "y", "z"];
   const colours = names.map((n) => css(`--axis-${n}`));
-  // Half lines that point away are painted before the body, those towards the reader after it.
+  // Half-axes that point away are painted before the body, those towards the reader after it.
   const drawAxes = (front) => unit.forEach((e, i) => {
     if (dot(e, away) > 0 === front) {
       line([0, 0, 0], e.map((c) => 1.24 * c), colours[i], 1.4, [6, 5]);
@@ -168,7 +168,7 @@ function paint(view, where) {
   if (earth && dot(earth, away) > 0) drawEarth();
   unit.forEach((e, i) => label(e.map((c) => 1.24 * c), `${names[i]}*`, colours[i], "italic"));
 
-  // An arrow from the edge of the picture's middle outwards, longer than the axes, which it may run along.
+  // The arrow starts at the edge of the central area and is longer than the axes, along which it may run.
   function drawEarth() {
     const colour = css("--soft");
     line(earth.map((c) => 1.5 * c), earth.map((c) => 1.66 * c), colour, 2, []);
@@ -189,7 +189,7 @@ function paint(view, where) {
     pen.textAlign = "center";
     pen.textBaseline = "middle";
     pen.fillStyle = colour;
-    // Within the view, however narrow it is.
+    // Labels stay within the view, however narrow it is.
     const half = pen.measureText(scene.centre).width / 2 + 3;
     const middle = Math.min(Math.max(x2 + 28 * ux, half), width - half);
     pen.fillText(scene.centre, middle, y2 + 15 * uy);
@@ -209,7 +209,7 @@ function paint(view, where) {
   }
 }
 
-// How far from the centre a body axis leaves the outline.
+// The distance from the centre at which a body axis leaves the outline.
 function reach(i) {
   const e = [0, 1, 2].map((k) => scene.axes[i][k]);
   return Math.min(...e.map((c, k) => scene.size[k] / Math.max(Math.abs(c), 1e-9)));

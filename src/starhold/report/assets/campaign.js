@@ -19,7 +19,7 @@ function smallest(values) {
   return Math.min(...values.filter((value) => value > 0));
 }
 
-// Side by side plots fill their boxes; in a fold there is no room to draw in until it is opened.
+// Plots side by side fill their boxes; a plot in a fold has no size until the fold is opened.
 const box = (plot) => document.getElementById(plot.name);
 const heightOf = (plot, otherwise) => (box(plot).closest(".two, .one") ? box(plot).clientHeight : otherwise);
 
@@ -27,7 +27,7 @@ function drawHistogram(plot) {
   if (!box(plot).clientWidth) return;
   const { axis, layout } = look();
   const curves = shownCurves(plot);
-  // On a logarithmic scale bars stand on what a single run would reach, or half of the least bar.
+  // On a logarithmic scale bars start at the height of a single run, or at half of the lowest bar.
   const ground = rare ? 0.5 * smallest(plot.curves.flatMap((curve) => curve.values)) : 0;
   const traces = curves.flatMap((curve) => {
     const law = report.laws[curve.law];
@@ -70,21 +70,21 @@ function drawHistogram(plot) {
       line: { color: css("--ink"), width: 1.4, dash: "dash" },
     })),
   });
-  // Shapes do not stretch an axis; an unseen point does.
+  // Shapes do not extend an axis, so an invisible point does.
   if (plot.levels.length) {
     traces.push({ type: "scatter", mode: "markers", x: plot.levels, y: plot.levels.map(() => ground || 0), marker: { opacity: 0 }, hoverinfo: "skip" });
   }
   Plotly.react(plot.name, traces, layout, settings(plot.name));
 }
 
-// Ticks at powers of ten where the bins span several of them, else where Plotly likes.
+// Ticks stand at powers of ten if the bins span several of them, otherwise where Plotly puts them.
 function decades(plot) {
   const ends = plot.curves.flatMap((curve) => [curve.edges[0], curve.edges[curve.edges.length - 1]]);
   const span = Math.log10(Math.max(...ends) / Math.min(...ends));
   return span > 2 ? Math.max(1, Math.ceil(span / 5)) : undefined;
 }
 
-// A value holds for the window that ends at its time; the corners of such steps, ahead.
+// A value holds for the window that ends at its time: returns the corners of these steps in order of time.
 function corners(times, values) {
   const x = [], y = [];
   times.forEach((time, k) => {
@@ -95,7 +95,7 @@ function corners(times, values) {
 }
 
 function bands(curve, plot) {
-  // Pieces between gaps, each once ahead along the top and back along the bottom.
+  // Each piece between gaps runs forward along the top and back along the bottom.
   const ground = plot.log ? 10 ** plot.span[0] : -Infinity;
   const [x, high] = corners(curve.times, curve.high);
   const low = corners(curve.times, curve.low)[1];
@@ -117,7 +117,7 @@ function drawEnvelope(plot) {
   if (!box(plot).clientWidth) return;
   const { axis, layout } = look();
   const curves = shownCurves(plot);
-  // From the start on, at which the first window begins.
+  // The first window begins at the start.
   const whole = (values) => [values[0], ...values];
   const since = (curve) => [0, ...curve.times];
   const positive = (values) => whole(plot.log ? values.map((value) => (value > 0 ? value : null)) : values);

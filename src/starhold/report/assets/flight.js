@@ -1,5 +1,5 @@
-// Flies one law again, and measures and thins what was flown: a worker's whole program, but for the law's own functions,
-// `fly`, `derive` and `note`, and `law`, what the page knows of it. The numbers are those that Python gives, bit for bit.
+// Flies one law again, then measures and thins the flight. This is the whole program of a worker except the law's functions
+// `fly`, `derive` and `note`, and `law`, the page's data about it. The numbers are those that Python gives, bit for bit.
 "use strict";
 
 const { sqrt, abs, max, min, atan2, asin, floor, ceil } = Math;
@@ -20,7 +20,7 @@ const count = floor(steps / every) + 1;
 const record = new Float64Array(count * width);
 const tick = law.period * every;
 
-// All numbers of the loop from the values of the keys that the law follows, in order.
+// Computes all numbers of the loop from the values of the law's keys, in order.
 function numbersOf(values) {
   const all = base.slice();
   if (derive) {
@@ -31,7 +31,7 @@ function numbersOf(values) {
   return all;
 }
 
-// The samples lie in `record`; returns how many there are, and the control step at which the motion was lost (-1: it was not).
+// Writes the samples to `record`; returns their number and the control step at which the motion diverged (-1: it did not).
 function flown(values) {
   const all = numbersOf(values);
   const carry = all.slice(0, law.carried);
@@ -45,7 +45,7 @@ function flown(values) {
   const rest = steps - groups * every;
   if (lost() < 0 && rest) call(groups * every, 1, rest, groups);
   if (lost() >= 0) return { n: max(1, ceil(lost() / every)), lost: lost() };
-  // The last sample shows what would be commanded next; the step that follows is flown for it and forgotten.
+  // The last sample shows the next command, so one more step is flown and discarded.
   if (!rest) call(steps, 1, 1, groups);
   return { n: count, lost: -1 };
 }
@@ -53,7 +53,7 @@ function flown(values) {
 // --- quantities of a sample, as `starhold.report` and `starhold.analysis` make them ---
 
 const at = (name, part = 0) => column[name][0] + part;
-// By products, for a power may round otherwise.
+// Products are used because a power may round differently.
 const square3 = (p) => record[p] * record[p] + record[p + 1] * record[p + 1] + record[p + 2] * record[p + 2];
 const norm3 = (k, place) => sqrt(square3(k * width + place));
 
@@ -71,7 +71,7 @@ function turnOf(k, which) {
   return atan2(2 * (b * c + a * d), 1 - 2 * (c * c + d * d)) * degrees;
 }
 
-// The mean derivative of the body's rate from a sample to the next, the last repeated.
+// The mean derivative of the body's rate between samples; the last one is repeated.
 function accelerationOf(k, n, part) {
   if (n < 2) return 0;
   const j = min(k, n - 2);
@@ -96,7 +96,8 @@ function curve([kind, ...told], n) {
   return values;
 }
 
-// Two of every `factor` samples, as `report.plots.thin` keeps them: the least and the greatest where the others swing further.
+// Keeps two of every `factor` samples, as `report.plots.thin` does: the extremes where the values between swing far beyond the
+// kept ones, otherwise the first and the middle.
 function thin(values, factor) {
   const n = values.length;
   if (factor === 1 || !n) return values;
@@ -121,16 +122,16 @@ function thin(values, factor) {
   return found;
 }
 
-// Angles with gaps where they jump from one end of their range to the other.
+// Inserts gaps where angles jump from one end of their range to the other.
 function unwrapped(values) {
   return values.map((value, k) => (k && abs(value - values[k - 1]) > 180 ? NaN : value));
 }
 
-// --- metrics: notes by the equation of `starhold.analysis.rigid_body`, and what its table makes of them ---
+// --- metrics: notes by the equation of `starhold.analysis.rigid_body`, and the metrics that its table computes from them ---
 
 const LAST = 0.25, KEPT = 0.1;
 
-// As `KINDS` of `starhold.analysis.meter`.
+// These are the `KINDS` of `starhold.analysis.meter`.
 const kinds = {
   number: (x) => x,
   root: sqrt,
@@ -141,7 +142,7 @@ const kinds = {
   most: max,
 };
 
-// What is noted of the first samples, and of those of the last quarter with windows begun anew.
+// Notes of the first samples, and of those in the last quarter with new windows.
 function notes(n, tail, limit) {
   const { first, numbers, memories, windows } = law.meter;
   const told = { tail, last: n - 1, limit: limit === null ? Infinity : limit };
@@ -175,7 +176,7 @@ function metrics(n, lost, asked) {
   return found;
 }
 
-// What the page asks for at a move: values, plots by name with what their panels are made of, thinned, frames, metrics.
+// Answers a move of the page: values, thinned plots by name with the data of their panels, frames and metrics.
 function answer(asked) {
   const { n, lost } = flown(asked.values);
   const shown = asked.early ? min(n, asked.early) : n;

@@ -1,4 +1,4 @@
-// Sliders: the laws fly again in workers with what they say; plots, ranking, views and claims follow.
+// Sliders: workers fly the laws again with the new values; plots, ranking, views and claims are updated.
 "use strict";
 
 const living = report.living;
@@ -9,7 +9,7 @@ const ATTITUDE = "initial.attitude";
 const flatten = (value) => (Array.isArray(value) ? value.flatMap(flatten) : [value]);
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
-// The value of a key: its own where it was moved, else that of the key it goes with, else the file's.
+// The value of a key: its own if it was moved, else that of the key that it follows, else the file's.
 function valueOf(key) {
   if (moved.has(key)) return moved.get(key);
   const leader = living.linked[key];
@@ -45,7 +45,7 @@ function runnerOf(number) {
   return runners.get(number);
 }
 
-// Whether a law flies again with what is moved: it does not where nothing of it is, or where it cannot follow.
+// Whether a law flies again after a move: not if none of its keys is moved, or if it cannot follow one of them.
 function fate(number) {
   const law = living.laws[number];
   if (!law) return living.grounded[number] ? { stays: living.grounded[number] } : {};
@@ -81,7 +81,7 @@ function send(number) {
   runner.worker.postMessage(asked);
 }
 
-// --- what follows a move ---
+// --- updates after a move ---
 
 let fates = [];
 
@@ -101,7 +101,7 @@ function move() {
   address();
 }
 
-// A law back to what the file's numbers gave.
+// Restores a law to the flight of the file's numbers.
 function restore(number) {
   state.results.delete(number);
   for (const chart of charts.values()) {
@@ -146,7 +146,7 @@ function reshape() {
   repaint();
 }
 
-// Half edges of the uniform box with this inertia, the longest 0.95, and its axes as columns, as the report makes them.
+// Half edges of the uniform box with this inertia, the longest 0.95, and its axes as columns, computed as in the report.
 function boxOf(inertia) {
   const [moments, axes] = Array.isArray(inertia[0]) ? principal(inertia) : [inertia, [[1, 0, 0], [0, 1, 0], [0, 0, 1]]];
   const sum = moments[0] + moments[1] + moments[2];
@@ -155,7 +155,7 @@ function boxOf(inertia) {
   return { size: edges.map((edge) => 0.95 * Math.max(edge / most, 0.1)), axes };
 }
 
-// Jacobi's rotations: moments, and axes as columns.
+// Jacobi's eigenvalue method: returns the moments, and the axes as columns.
 function principal(matrix) {
   const a = matrix.map((row) => row.slice());
   const v = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
@@ -233,7 +233,7 @@ function rank() {
   }).join("");
 }
 
-// --- claims: lit where what they stand on stays ---
+// --- claims: highlighted while the values that they depend on are unchanged ---
 
 function standing(claim) {
   const gains = living.dials.find((dial) => dial.law === claim.law && isMoved(dial.key));
@@ -283,9 +283,9 @@ function claims() {
   document.body.classList.toggle("moved", living.dials.some((dial) => isMoved(dial.key)));
 }
 
-// --- what the program refuses ---
+// --- refusals of the program ---
 
-// Texts of functions, run as a script of the page: its policy forbids `eval`.
+// The texts of functions run as a script of the page, because its policy forbids `eval`.
 const questions = [];
 const script = document.createElement("script");
 script.textContent = living.asked.map(({ program }) => `questions.push((() => {\n${program.text}\nreturn ${program.name};\n})());`).join("\n");
@@ -294,7 +294,7 @@ document.head.append(script);
 // A number as Python's format "g" or ".4g" writes it.
 const formatted = (value, spec) => (Number.isFinite(value) ? general(value, Number(spec.match(/\.(\d+)g/)?.[1] ?? 6)) : String(value));
 
-// What the program would say of the file as it is; "" where it takes it.
+// The program's message about the current file; "" if it accepts the file.
 function refusal() {
   const { least, most } = living.ranges;
   for (const dial of living.dials.filter(({ key }) => isMoved(key))) {
@@ -315,9 +315,9 @@ function refusal() {
   return "";
 }
 
-// --- the file of what is seen, and its address ---
+// --- the file of the current values, and its address ---
 
-// A number as Python reads it back, the same bits.
+// A number in a form that Python reads back with the same bits.
 function written(value) {
   if (Array.isArray(value)) return `[${value.map(written).join(", ")}]`;
   const text = Object.is(value, -0) ? "-0.0" : String(value);
@@ -335,7 +335,7 @@ function hash() {
 
 let addressed = 0;
 function address() {
-  // Browsers refuse more than a few changes a second.
+  // Browsers refuse more than a few changes per second.
   clearTimeout(addressed);
   addressed = setTimeout(() => history.replaceState(null, "", `#${hash()}`), 250);
 }
@@ -351,7 +351,7 @@ function readAddress() {
         && same(shapeOf(given), shapeOf(like.value)) && flatten(given).every((x) => within(like, x));
       if (sound) moved.set(key, given);
     } catch {
-      // An address that somebody broke moves nothing.
+      // A malformed address moves nothing.
     }
   }
 }

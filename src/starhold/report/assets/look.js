@@ -1,4 +1,4 @@
-// How Plotly draws, in the colours of the page.
+// Settings of Plotly, in the colours of the page.
 "use strict";
 
 function look() {

@@ -1,4 +1,4 @@
-// The craft near the libration point, one view for each law: its path, the circle to be held, and the control as an arrow.
+// The craft near the libration point, one view per law: its path, the target circle, and the control as an arrow.
 "use strict";
 
 const TAIL = 160;
@@ -39,7 +39,7 @@ function paint(view, where) {
     pen.globalAlpha = 1;
   }
   function word(p, text, colour, align) {
-    // In a small picture words would cover the path.
+    // In a small picture labels would cover the path.
     if (width < 200 || height < 160) return;
     const [x, y] = flat(p);
     pen.font = "12px system-ui, sans-serif";

@@ -1,4 +1,4 @@
-// Pictures in a plane: the paths of the laws over one another, with lines and areas to judge them by.
+// Plane pictures: the paths of all laws in one plot, with reference lines and areas.
 "use strict";
 
 function guideLine(guide, k) {
@@ -64,6 +64,6 @@ function drawAllPlanes() {
 
 drawAllPlanes();
 addEventListener("resize", drawAllPlanes);
-// In a fold there is no room to draw in until it is opened.
+// A plot in a fold has no size until the fold is opened.
 document.addEventListener("toggle", drawAllPlanes, true);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAllPlanes);

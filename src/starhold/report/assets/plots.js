@@ -4,7 +4,7 @@
 const charts = new Map();
 const hidden = new Set();
 let colours = {};
-// Of a run that is long beside its transient both can be seen; the page has a switch.
+// If a run is much longer than its transient, a switch on the page selects the whole run or the transient.
 let transient = false;
 
 function readColours() {
@@ -24,11 +24,11 @@ function short(value, digits = 4) {
   return `${Number(mantissa)}×10${superscript(Number(power))}`.replace("-", "−");
 }
 
-// --- units that suit the numbers ---
+// --- units to suit the numbers ---
 
 const SPANS = [[172800, 86400, "days"], [7200, 3600, "h"], [600, 60, "min"], [0, 1, "s"]];
 
-// The unit of a plot's time axis, and how many of its clock's ticks that is.
+// The unit of a plot's time axis, and its length in units of the clock.
 function clockOf(plot) {
   if (plot.clock !== "s") return [1, plot.clock];
   const times = timesOf(plot);
@@ -37,7 +37,7 @@ function clockOf(plot) {
 
 const PREFIXES = { "-12": "p", "-9": "n", "-6": "µ", "-3": "m", 3: "k", 6: "M" };
 
-// By what a panel's numbers are divided, and its label then.
+// The divisor of a panel's numbers, and the label that goes with it.
 function unitOf(panel, u) {
   const [, name, unit] = panel.label.match(/^(?:(.*), )?(.*)$/);
   const written = (text) => [name, text === "1" ? "" : text.replace("^2", "²").replace("^3", "³")].filter(Boolean).join(", ");
@@ -49,7 +49,7 @@ function unitOf(panel, u) {
   return { factor: 10 ** power, label: `${written(unit)} ×10${superscript(power)}` };
 }
 
-// Where the words of marks stand above a plot: rows of which none overlaps another; "" for what has no room.
+// Arranges the labels of marks above a plot in rows without overlaps; "" for a label without room.
 const WORD_ROWS = 3, WORD_HEIGHT = 13;
 function placedWords(marks, place, measure) {
   const ends = Array(WORD_ROWS).fill(-Infinity);
@@ -60,14 +60,14 @@ function placedWords(marks, place, measure) {
   });
 }
 
-// A number made 1, 2 or 5 times a power of ten, down or up.
+// Rounds a number down or up to 1, 2 or 5 times a power of ten.
 function rounded(value, way) {
   const power = 10 ** Math.floor(Math.log10(value)), digits = [1, 2, 5, 10];
   const share = value / power;
   return power * (way === Math.floor ? digits.findLast((d) => d <= share * (1 + 1e-9)) : digits.find((d) => d >= share * (1 - 1e-9)));
 }
 
-// The ordinates to show: of laws that are shown and were not lost, with the levels.
+// The range of ordinates: that of visible laws that did not diverge, and of the levels.
 function span(panel, chart, u) {
   if (panel.span && !chart.live) return panel.span;
   const [first, last] = u.series[0].idxs || [0, u.data[0].length - 1];
@@ -83,13 +83,13 @@ function span(panel, chart, u) {
       if (value > high) high = value;
     }
   }
-  // What is drawn stretches an axis by itself at the most; a limit farther off is told in words.
+  // A level extends an axis only if it is near the curves; a more distant limit is given in words.
   const [under, over] = panel.log ? [low / 100, high * 100] : [2 * low - high, 2 * high - low];
   for (const level of panel.levels) {
     if (level >= under && level <= over) [low, high] = [Math.min(low, level), Math.max(high, level)];
   }
   if (low > high) return panel.log ? [0.1, 1] : [0, 1];
-  // Below this share of the largest there is rounding, and more decades than there is room for.
+  // Below this share of the largest value lies rounding, and more decades than there is room for.
   if (panel.log) low = Math.max(low, 1e-15 * high);
   if (panel.log) return [rounded(low, Math.floor), rounded(high, Math.ceil)];
   if (low === high) return [low - 1, high + 1];
@@ -136,17 +136,17 @@ function guides(panel, plot, chart) {
       const high = u.valToPos(level, "y", true);
       line([bbox.left, high], [right, high], [6, 4]);
     }
-    // A strip below where the estimate is not valid, in the flight of the file.
+    // A strip at the bottom marks where the estimate is not valid, in the flight of the file.
     ctx.fillStyle = colours.soft;
     for (const [start, end] of chart.live ? [] : report.unsure || []) {
       const [from, to] = [Math.max(start, x.min), Math.min(end, x.max)].map((time) => u.valToPos(time, "x", true));
       if (to <= from || plot.split) continue;
       ctx.fillRect(from, bbox.top + bbox.height - 4 * dot, to - from, 4 * dot);
-      // The words stay inside the plot.
+      // The label stays inside the plot.
       ctx.textAlign = from > bbox.left + bbox.width / 2 ? "right" : "left";
       ctx.fillText("estimate not valid", ctx.textAlign === "left" ? from : to, bbox.top + bbox.height - 7 * dot);
     }
-    // What is proved is about the flight of the file.
+    // Proved bounds are about the flight of the file.
     for (const [number, times, most] of chart.live ? [] : panel.bounds || []) {
       if (hidden.has(number)) continue;
       ctx.strokeStyle = report.laws[number].colour;
@@ -193,7 +193,7 @@ function guides(panel, plot, chart) {
   };
 }
 
-// The values under the pointer, in the corner of each panel, and a line at the moment that the views show.
+// Shows the values under the pointer in the corner of each panel, and a line at the time that the views show.
 function readout(panel, k, chart) {
   const box = document.createElement("div"), line = document.createElement("i");
   box.className = "readout";
@@ -264,7 +264,7 @@ function options(plot, panel, k, chart, size) {
   };
 }
 
-// Powers of ten as they are read, where the axis has none too small for that.
+// Powers of ten are written as decimals if the axis has none too small for that.
 function powersOfTen(u, splits) {
   const { min, max } = u.scales.y;
   return splits.map((v) => {
@@ -273,7 +273,7 @@ function powersOfTen(u, splits) {
   });
 }
 
-// Of powers of ten as many as there is room for.
+// Labels as many powers of ten as there is room for.
 function decades(u, splits) {
   const powers = splits.filter((v) => v !== null && nearlyWhole(Math.log10(v)));
   const every = Math.ceil(powers.length / Math.max(2, u.height / 34));
@@ -313,7 +313,7 @@ function legend(plot) {
   return `<div class="legend-row">${(laws.length > 1 ? laws : []).concat(plot.name === report.plots[0].name ? keys : []).join("")}</div>`;
 }
 
-// A plot's panels, made anew; what flies again changes their data afterwards.
+// Makes the panels of a plot; later flights change only their data.
 function draw(plot) {
   const box = document.getElementById(plot.name);
   const before = charts.get(plot.name);
@@ -328,7 +328,7 @@ function draw(plot) {
   chart.panels = plot.panels.map((panel, k) => new uPlot(options(plot, panel, k, chart, measures[k]), dataOf(plot, panel), place));
 }
 
-// A law's curves of a plot as they were flown last.
+// Sets the curves of a law in a plot to those of its last flight.
 function setCurves(name, number, curves, lost) {
   const chart = charts.get(name);
   chart.live = true;
@@ -340,7 +340,7 @@ function setCurves(name, number, curves, lost) {
   chart.changed = true;
 }
 
-// Draws what `setCurves` changed; where the reader has zoomed in, the zoom stays.
+// Draws the changes by `setCurves`; the reader's zoom is kept.
 function redrawChanged() {
   for (const chart of charts.values()) {
     if (!chart.changed) continue;
@@ -373,7 +373,7 @@ document.addEventListener("click", (event) => {
   const button = event.target.closest(".law-name");
   if (!button) return;
   const number = Number(button.dataset.law);
-  // A second click at once: this law alone, or all.
+  // A double click shows this law alone, or all.
   if (event.detail === 2) {
     const alone = report.laws.every((_, other) => other === number || hidden.has(other));
     hidden.clear();
@@ -392,7 +392,7 @@ if (report.transient) {
   }));
 }
 
-// Plot and body take what the rest of the first screen leaves.
+// Plot and body take the space that the rest of the first screen leaves.
 const lead = document.querySelector(".two, .one");
 const measureAbove = () => document.documentElement.style.setProperty("--above", `${lead.getBoundingClientRect().top + scrollY}px`);
 if (lead) {
@@ -411,7 +411,7 @@ const fit = new ResizeObserver((entries) => {
     if (chart.box.clientWidth) chart.panels.forEach((u, k) => { if (u.width !== measures[k].width || u.height !== measures[k].height) u.setSize(measures[k]); });
   }
 });
-// What is out of sight is drawn when it comes into sight.
+// A plot out of sight is drawn when it comes into sight.
 const sight = new IntersectionObserver((entries) => {
   for (const entry of entries) charts.get(entry.target.id).seen = entry.isIntersecting;
   document.dispatchEvent(new Event("plots-seen"));

@@ -1,11 +1,11 @@
-// The panel of sliders: a slider and a field for each number, groups for the start, the spacecraft and each law.
+// The panel of sliders: a slider and a field per number, in groups for the start, the spacecraft and each law.
 "use strict";
 
 const panel = document.getElementById("dials");
 const sliders = [];
 const { range: RANGE, near: NEAR } = living.ranges;
 const AXES = ["x", "y", "z"];
-// Which of the two inertias the sliders move.
+// The inertia that the sliders move: the true one or that assumed by the laws.
 let lawsKnow = true;
 const keyOf = (dial) => (dial.key === KNOWN && !lawsKnow ? TRUE : dial.key);
 
@@ -14,7 +14,7 @@ const logarithmic = (base, range) => ({
   to: (t) => tidy(base * range ** (2 * t - 1)), from: (value) => 0.5 + 0.5 * Math.log(value / base) / Math.log(range),
 });
 const linear = (low, high) => ({ to: (t) => tidy(low + (high - low) * t), from: (value) => (value - low) / (high - low) });
-// Fine near zero, for what has no size of its own.
+// A scale that is fine near zero, for values without a natural size.
 const fromZero = (high) => ({ to: (t) => tidy(high * t ** 3), from: (value) => Math.cbrt(value / high) });
 
 function scaleOf(dial, base) {
@@ -26,7 +26,7 @@ function scaleOf(dial, base) {
   return linear(-2 * Math.abs(base), 2 * Math.abs(base));
 }
 
-// The sliders of a key: what each reads of the key's value, and what it makes of it.
+// The sliders of a key: how each reads the key's value, and how it changes it.
 function slidersOf(dial) {
   const value = dial.value;
   const one = (label, base, read, write, scale = scaleOf(dial, base), unit = dial.unit) => ({ dial, label, base, read, write, scale, unit });
@@ -48,7 +48,7 @@ function slidersOf(dial) {
       return [one("all axes", value[0], (given) => given[0], (given, x) => given.map(() => x))];
     }
     const most = Math.max(...value.map(Math.abs)) || 0.02;
-    // In degrees where the file is; the file's own number stays as it is.
+    // In degrees if the file uses degrees; the file's own number is unchanged.
     const unit = dial.degrees ? 180 / Math.PI : 1;
     const told = (x) => (dial.degrees ? Number((x * unit).toPrecision(12)) : x);
     const meant = (x, k) => (x === told(value[k]) ? value[k] : x / unit);
@@ -59,7 +59,7 @@ function slidersOf(dial) {
     ));
   }
   if (dial.law !== null) {
-    // A matrix of gains is stretched as a whole.
+    // A matrix of gains is scaled as a whole.
     const [i, j] = largest(value);
     const write = (given, x) => (x === 1 ? value : value.map((row) => row.map((y) => y * x)));
     return [one("factor", 1, (given) => given[i][j] / value[i][j], write, logarithmic(1, RANGE), "")];
@@ -80,7 +80,7 @@ function largest(matrix) {
 
 // --- angles: yaw, pitch, roll in degrees, about the third, the new second, the new first axis ---
 
-// Angles that were set stay as they were set, whatever rounding makes of them on the way back.
+// Angles that were set are kept exactly, because conversion back and forth rounds.
 let turned = null;
 
 function anglesOf(given) {
@@ -235,7 +235,7 @@ function begin() {
   move();
 }
 addEventListener("hashchange", () => { if (location.hash.slice(1) !== hash()) begin(); });
-// What comes into sight, or is drawn anew, is flown for.
+// A plot that comes into sight or is drawn again causes a flight.
 for (const name of ["plots-seen", "plots-drawn"]) {
   document.addEventListener(name, () => fates.forEach((found, number) => { if (found.flies) send(number); }));
 }

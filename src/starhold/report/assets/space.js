@@ -1,23 +1,23 @@
-// What views in three dimensions share: vectors, where the reader stands, and the player that runs through a scene.
+// Shared by the three-dimensional views: vectors, the viewpoint, and the player that runs through a scene.
 "use strict";
 
 const scene = report.scene;
 const last = scene.times.length - 1;
-// Where the reader stands, as turns about the third axis and above the horizon; dragging changes both.
+// The viewpoint as azimuth about the third axis and elevation; dragging changes both.
 const eye = { around: -0.9, above: 0.42 };
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const plus = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
 
-// The direction to the reader, and what is right and up for the reader.
+// The directions towards, right and up as seen by the reader.
 function stance() {
   const away = [Math.cos(eye.above) * Math.cos(eye.around), Math.cos(eye.above) * Math.sin(eye.around), Math.sin(eye.above)];
   const right = [-Math.sin(eye.around), Math.cos(eye.around), 0];
   return { away, right, up: cross(away, right) };
 }
 
-// A canvas with as many pixels as the screen has there, wiped.
+// Clears a canvas and matches its pixels to those of the screen.
 function cleared(canvas) {
   const ratio = window.devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
@@ -34,7 +34,7 @@ function timeAt(where) {
   return scene.times[k] + (where - k) * (scene.times[k + 1] - scene.times[k]);
 }
 
-// Slider, button and clock; `paint(view, where)` draws a view at a frame, which need not be whole. Returns what paints again.
+// Slider, button and clock; `paint(view, where)` draws a view at a (fractional) frame. Returns a function that repaints.
 function startShow(views, paint, timeText) {
   const slider = document.getElementById("moment");
   const clock = document.getElementById("clock");
@@ -52,7 +52,7 @@ function startShow(views, paint, timeText) {
     document.dispatchEvent(new CustomEvent("moment", { detail: timeAt(place) / (scene.tick || 1) }));
   }
 
-  // The frame of a time; between two of them it need not be whole.
+  // The frame at a time, which may be fractional.
   function frameAt(time) {
     const k = Math.max(0, Math.min(last - 1, scene.times.findIndex((other) => other > time) - 1));
     return time >= scene.times[last] ? last : k + (time - scene.times[k]) / (scene.times[k + 1] - scene.times[k]);

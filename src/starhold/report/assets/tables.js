@@ -1,4 +1,4 @@
-// Tables wider than the screen fade out where more of them can be scrolled to, and say so.
+// Tables wider than the screen fade out at the edge towards hidden columns, and say so.
 for (const box of document.querySelectorAll(".wide")) {
   const hint = document.createElement("p");
   hint.className = "note hint";

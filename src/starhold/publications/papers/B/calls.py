@@ -58,9 +58,9 @@ def call_times(desk: Desk) -> dict[str, NDArray[np.float64]]:
                 chunk = TIMED[name].chunk
                 empty[name] = min([empty[name], *(_timed(kernel, 0, 0) for _ in range(20))])
                 for number in range(len(times[name])):
-                    spent = _timed(kernel, number * chunk, (number + 1) * chunk) - empty[name]
-                    times[name][number] = min(times[name][number], max(spent, 1e-9) / chunk)
-        return times
+                    times[name][number] = min(times[name][number], _timed(kernel, number * chunk, (number + 1) * chunk))
+        # Both are least before one is taken from the other: an empty call in a slow moment would make a call too short.
+        return {name: np.maximum(spent - empty[name], 1e-9) / TIMED[name].chunk for name, spent in times.items()}
 
     return desk.once(("call times",), make)
 
