@@ -204,17 +204,11 @@ class Pushed:
         return False
 
     def begun(self, angle: float, rate: float, limits: dict[str, float]) -> list[Chain]:
-        """Return chains from a start set: within limits one, by a V of which the set asks for little torque, else one for
-        each lean of V. None, and the reason in `failed`, where V does not decrease on the set or the torque exceeds its
-        limits there."""
+        """Return chains from a start set, the first of `trials` that are any; none, and the reason in `failed`, where V does
+        not decrease on the set or the torque exceeds its limits there."""
         loop, numbers = self.loop, self.beginning(angle, rate, limits)
-        if limits:
-            shapes = soft(self.sampled(self.usual[0]).motion, limits, angle, rate)
-            tried = ([self.chain(shape, angle, rate)] for shape in shapes)
-        else:
-            tried = iter([[self.chain(lean.shape, angle, rate) for lean in self.leans]])
         loop.failed[POINTS] = "the torque exceeds its limit"
-        for chains in tried:
+        for chains in self.trials(angle, rate, limits):
             first = chains[0]
             if asks_more(first.motion, first.level, limits):
                 continue
@@ -223,6 +217,18 @@ class Pushed:
             elif begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
                 return chains
         return []
+
+    def trials(self, angle: float, rate: float, limits: dict[str, float]) -> Iterator[list[Chain]]:
+        """Yield chains to try together: one for each lean of V; or within limits one alone, by each V of which the set asks
+        for little torque, and at last by the locally best one."""
+        if not limits:
+            yield [self.chain(lean.shape, angle, rate) for lean in self.leans]
+            return
+        shapes = soft(self.sampled(self.usual[0]).motion, limits, angle, rate)
+        for shape in shapes:
+            yield [self.chain(shape, angle, rate)]
+        if (best := self.leans[0].shape) not in shapes:
+            yield [self.chain(best, angle, rate)]
 
     def beginning(self, angle: float, rate: float, limits: dict[str, float]) -> dict[str, Any]:
         """Return the claim's numbers of a start, without its level."""
