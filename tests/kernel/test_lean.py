@@ -8,8 +8,8 @@ import pytest
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.vector import add, cross, dot, scale
+from starhold.certification.evidence.chains import Chain
 from starhold.certification.evidence.finding import read
-from starhold.certification.evidence.pointing import Chain
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import RefusedError

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from starhold.certification.evidence import responses
+from starhold.certification.evidence.chains import Chain
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
-from starhold.certification.evidence.pointing import Chain
 from starhold.certification.proofs import checked
 from starhold.kernel.check import check
 from starhold.kernel.held import Held

@@ -32,6 +32,8 @@ SYMBOLS = {
     "mu": ("μ in (σ² + μx²)/2, σ = x + ẋ/s", ""),
     "reach": ("|x|, at most", ""),
     "epsilon": ("ε in V + ε q·Jω", ""),
+    "soft": ("share of V's potential that is taken, as if the target pulled less", ""),
+    "moment": ("moment of inertia about all axes that stands for J in V", "kg m²"),
     "rho": ("bound on the added term, as a share of V", ""),
     "rate_bound": ("rate up to which V is shown to be non-increasing", "rad/s"),
     "tau": ("τ: a torque M does work of at most τ |Wᵀω + εq|² + M²/(4τ)", ""),

@@ -4,45 +4,40 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from importlib import import_module
 from math import degrees, inf, isfinite, pi, radians, sin, sqrt
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.ellipsoids import HEED, MORE, ends, highest_ratio, smallest
-from starhold.certification.evidence.finding import concluded, read
-from starhold.certification.evidence.lates import begun_late, numbers_of, of_late, resting, weighed
+from starhold.certification.evidence.chains import Chain, Lower
+from starhold.certification.evidence.ellipsoids import MORE
+from starhold.certification.evidence.finding import read
+from starhold.certification.evidence.lates import begun_late, numbers_of, resting, weighed
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
-from starhold.certification.evidence.responses import find_response
-from starhold.certification.evidence.squares import rounded
+from starhold.certification.evidence.shapes import Shape, largest_in, soft
 from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
-from starhold.certification.matrices import above, floats
+from starhold.certification.matrices import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, demand, plus, times, transpose
+from starhold.kernel.numbers import RefusedError, demand
 from starhold.kernel.plans import Plan
-from starhold.kernel.regions import TURN, Tube, balls
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
-from starhold.kernel.theorems.response import first_of, responds
 from starhold.parts.craft import tensor
 
 linalg: Any = import_module("scipy.linalg")
 Array = NDArray[np.float64]
 
-ANGLES = (175, 150, 120, 90, 75, 60, 45, 35, 30, 25, 20, 15, 10)
+ANGLES = (175, 150, 120, 105, 90, 75, 60, 52, 45, 40, 35, 30, 25, 22, 20, 17, 15, 12, 10, 8, 7, 6, 5, 4, 3, 2, 1, 0.5)
 """The initial rotations (deg) from which convergence is attempted."""
-NEAR = (7, 5, 3, 2, 1, 0.5)
-"""Further ones, for laws that are known near the target alone."""
 RATES = (5, 3, 2, 1, 0.5)
 """The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
 NEARLY = 10.0
@@ -54,159 +49,9 @@ NEARER = 0.25
 LEANS = (0.1, 0.18, 0.3, 0.45)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment); the law's
 own V, if it is a form of q, takes the place of the first two terms."""
-FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 8.0, 20, 24
-"""The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
-the largest ratio of successive levels; the most levels and ellipsoids."""
+RISES = "V does not decrease on the set from which motions start"
 
-Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 Beginning: TypeAlias = tuple[list[float], float, dict[str, float], list[float]]
-
-
-@dataclass
-class Chain:
-    """Levels from a set down to where disturbances outweigh the damping, and ellipsoids from there on."""
-
-    motion: Held
-    V: str
-    level: float
-    tried: dict[Any, Lower | None] = field(default_factory=dict[Any, "Lower | None"])
-    """The results of `lower`, for all chains of one V."""
-    levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
-    ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
-    response: dict[str, Any] = field(default_factory=dict[str, Any])
-    samples: int = 0
-
-    def aim(self) -> float:
-        """Return the level that disturbances allow where all motions are nearly linear."""
-        lower = self.lower((self.motion.s + self.motion.G[3][3]) / 2**20)
-        return inf if lower is None else float(lower[2])
-
-    def decreases(self) -> bool:
-        """Return whether V decreases on the whole set, down to a lower level."""
-        lower = self.lower(Fraction(self.level))
-        return lower is not None and lower[2] < Fraction(self.level)
-
-    def of_level(self) -> dict[str, Any]:
-        """Return the claim's numbers that follow from its level."""
-        late = of_late(self.motion.late)
-        if self.motion.plan is None:
-            return {"level": self.level} | late
-        region = self.motion.region(Fraction(self.level))
-        off = self.motion.planned((self.motion.tube(region).region if self.motion.grows else region).sizes)
-        return {"level": self.level} | late | {"plan.error": float(off) * MORE}
-
-    def descend(self) -> float:
-        """Find the levels, and return the last."""
-        c, tube = Fraction(self.level), None
-        while len(self.levels) < LEVELS and (lower := self.lower(c)) is not None:
-            tau, beta, floor = lower
-            end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
-            if end > c * Fraction(9, 10):
-                break
-            self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
-            tube, more = on_level(self.motion, end, tube or self.motion.tube(self.motion.region(c)))
-            self.samples += periods(self.motion.h * beta, floor, c, end) + more
-            c = end
-        return float(c)
-
-    def lower(self, c: Fraction) -> Lower | None:
-        """Return tau and beta for the lowest level proved to be reached from another, and that level."""
-        key = c, self.motion.late
-        if key not in self.tried:
-            self.tried[key] = self.lowest(c)
-        return self.tried[key]
-
-    def lowest(self, c: Fraction) -> Lower | None:
-        """Find what `lower` returns."""
-        motion = self.motion
-        try:
-            exact, above, felt, push, rest, spare = motion.fall(on_level(motion, c)[0])
-        except RefusedError:
-            return None
-        Q, H, F = floats(exact), floats(above), floats(felt)
-        if float(np.linalg.eigvalsh(Q)[0]) <= 0.0:
-            return None
-        R = F.T @ F
-        largest = 1.0 / float(linalg.eigh(R, Q, eigvals_only=True)[-1])
-
-        def floor(share: float) -> tuple[float, float, float]:
-            tau = largest * share
-            beta = float(linalg.eigh(Q - tau * R, H, eigvals_only=True)[0]) * (1.0 - 1e-6)
-            beta = min(beta, float(spare) * (1.0 - 1e-6) / float(motion.h))
-            return ((float(push) ** 2 / (4.0 * tau) + float(rest)) / beta if beta > 0.0 else inf), tau, beta
-
-        _, tau, beta = min(floor(share) for share in np.linspace(0.02, 0.98, 33))
-        if beta <= 0.0:
-            return None
-        t, b = Fraction(tau), Fraction(beta)
-        return t, b, (push * push / (4 * t) + rest) / b
-
-    def tighten(self, tube: Tube) -> tuple[float, float]:
-        """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
-        angle, fastest = ends(self.motion, tube, tube.region.X)
-        heed, corners = HEED, self.motion.corners()
-        away, entered = self.motion.away, self.motion.entered(tube)
-        for _ in range(ELLIPSOIDS):
-            within, more = forgotten(self.motion, tube)
-            pushes = self.motion.linear(within)
-            sized = [floats(B) * float(b) for B, b in pushes]
-            ellipsoid = smallest(floats(self.motion.near.A), np.array(list(map(floats, corners))), sized, heed)
-            if ellipsoid is None:
-                break
-            shape, shares = ellipsoid
-            X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
-            added = spread(a, pushes)
-            moved = (plus(added, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
-            rate = max(highest_ratio(after, X) for after in moved)
-            reach = highest_ratio(entered, X)
-            inner = self.motion.tube(within.region.within(X, away))
-            more += waited(self.motion, within, inner)
-            end = ends(self.motion, inner, X, away)
-            if rate >= 1.0 or end[0] > angle * 0.99:
-                if not heed:
-                    break
-                heed = 0.0
-                continue
-            self.samples += more
-            one = {"shape": [[str(x) for x in row] for row in X], "shares": [str(x) for x in a]}
-            self.ellipsoids.append(one | {"rate": str(Fraction(rate)), "reach": str(Fraction(reach))})
-            room = 1 - sum(a)
-            fall = 1 - Fraction(rate) * room
-            self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
-            tube, entered, (angle, fastest) = inner, X, end
-        return angle, fastest
-
-    def nearest(self) -> tuple[Chain, tuple[float, float]]:
-        """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
-        (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
-        tube, _ = on_level(self.motion, Fraction(self.levels[-1]["end"]))
-        self.motion.nears(tube)
-        one = replace(self, ellipsoids=list[Any]())
-        ends = [(one, one.respond(tube))]
-        if not one.response or self.motion.loop.wheels:
-            ends.append((self, self.tighten(tube)))
-        return min(ends, key=lambda pair: pair[1][0])
-
-    def respond(self, tube: Tube) -> tuple[float, float]:
-        """Find how often the response brings motions nearer, and return the ultimate bounds."""
-        motion, evidence = self.motion, find_response(self.motion)
-        (begun, pulled), rounds = first_of(motion, tube), 0
-        angle, fastest = ends(self.motion, tube, tube.region.X)
-        response = None if evidence is None else concluded(responds(motion, evidence["weights"], evidence["gains"]))
-        while evidence is not None and response is not None and rounds < ROUNDS:
-            try:
-                within, more = forgotten(motion, tube)
-                begun, pulled, inner = response.after(motion, within, begun, pulled)
-                more += waited(motion, within, inner)
-            except RefusedError:
-                break
-            end = ends(self.motion, inner, balls(begun), motion.away)
-            if not end[0] < angle * 0.999:
-                break
-            tube, (angle, fastest), rounds = inner, end, rounds + 1
-            self.samples += response.count + more
-            self.response = {"response": evidence | {"rounds": rounds}}
-        return angle, fastest
 
 
 def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float | None = None) -> bool:
@@ -215,7 +60,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
     like: the numbers of a claim, for the same start set and limits, and with noise if it includes noise."""
     if like is None:
         rates = dict.fromkeys((start_rate(loop.loop) * MORE if begun is None else begun, 0.0))
-        angles = list(map(radians, (*ANGLES, *NEAR) if loop.plan is not None or loop.known.late else ANGLES))
+        angles = list(map(radians, ANGLES))
         beyond = list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
@@ -243,6 +88,15 @@ def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pus
     return both if not angle or first.may_begin(angle, rate, begin[2]) else both[::-1]
 
 
+class Lean(NamedTuple):
+    """A V by its shape and digest, the loop with it, and the results of `lower`."""
+
+    shape: Shape
+    V: str
+    motion: Held
+    tried: dict[Any, Lower | None]
+
+
 class Pushed:
     """A loop under unmodelled torques and errors. RefusedError for a law outside the theorem."""
 
@@ -264,7 +118,7 @@ class Pushed:
         bounded = all(map(isfinite, against.numbers.values()))
         demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
-        self.larger, self.refused = list[tuple[float, float, str]](), dict[tuple[Any, ...], str]()
+        self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= numbers_of(loop.known.late)
@@ -276,26 +130,30 @@ class Pushed:
         self.radii = [*map(Fraction, self.evidence.get("swayed", ()))]
         changes = change_of_modelled(loop.loop, loop.known.envelope(noisy)) if OUTSIDE in words else (inf,)
         self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
-        self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
-        slow = sqrt(self.stiffness / self.J)
+        slow = sqrt(self.stiffness / float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1]))
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
-        self.leans = [
-            (float(f"{lean * slow:.4g}"), *self.sampled(float(f"{lean * slow:.4g}")), dict[Any, Lower | None]())
-            for lean in LEANS
-        ]
-        # The locally best is tried first, and taken if it descends from the whole set.
-        self.leans.sort(key=lambda lean: Chain(lean[2], lean[1], 0.0, lean[3]).aim())
+        self.known = dict[Shape, Lean]()
+        self.usual = [Shape(float(f"{lean * slow:.4g}")) for lean in LEANS]
 
-    def sampled(self, epsilon: float) -> tuple[str, Held]:
+    @cached_property
+    def leans(self) -> list[Lean]:
+        """Return V with the potential as it is, the locally best first, which is taken if it descends from the whole set."""
+        leans = [self.sampled(shape) for shape in self.usual]
+        return sorted(leans, key=lambda lean: Chain(lean.motion, lean.V, 0.0, lean.tried).aim())
+
+    def sampled(self, shape: Shape) -> Lean:
         """Return V and the loop."""
-        V = self.loop.crossed(None if self.even else self.stiffness, epsilon)
-        wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
-        motion = Held(wired, self.plan)
-        self.plan = motion.plan
-        if self.radii:
-            motion.sways(self.radii)
-        motion.late = weighed(motion, self.scales)
-        return V, motion
+        if shape not in self.known:
+            s = None if self.even else self.stiffness
+            V = self.loop.crossed(s, shape.epsilon) if shape in self.usual else self.loop.softened(s, shape)
+            wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
+            motion = Held(wired, self.plan)
+            self.plan = motion.plan
+            if self.radii:
+                motion.sways(self.radii)
+            motion.late = weighed(motion, self.scales)
+            self.known[shape] = Lean(shape, V, motion, {})
+        return self.known[shape]
 
     def claim(self, V: str, numbers: dict[str, Any], **evidence: Any) -> dict[str, Any]:
         """Return the claim with its numbers, and its evidence except that about noise."""
@@ -330,11 +188,13 @@ class Pushed:
     def may_begin(self, angle: float, rate: float, limits: dict[str, float]) -> bool:
         """Return whether there is a start set, which is looked for once."""
         key = angle, rate, *limits.items()
-        if key not in self.refused:
-            self.refused[key] = "" if self.begun(angle, rate, limits, True) is not None else self.loop.failed[POINTS]
-        if self.refused[key]:
-            self.loop.failed[POINTS] = self.refused[key]
-        return not self.refused[key]
+        if key not in self.beginnings:
+            shapes = [chain.shape for chain in self.begun(angle, rate, limits)]
+            self.beginnings[key] = shapes, "" if shapes else self.loop.failed[POINTS]
+        shapes, why = self.beginnings[key]
+        if not shapes:
+            self.loop.failed[POINTS] = why
+        return bool(shapes)
 
     def kept(self, tried: Callable[..., Any], angle: float, rate: float, limits: dict[str, float]) -> bool:
         """Return whether a start is taken, and keep why it is not."""
@@ -344,48 +204,65 @@ class Pushed:
         self.larger.append((angle, rate, start + self.loop.failed[POINTS]))
         return False
 
-    def begun(
-        self, angle: float, rate: float, limits: dict[str, float], examined: bool = False
-    ) -> tuple[dict[str, Any], list[Chain]] | None:
-        """Return the claim's numbers of the start set, and a chain from there for each lean of V; None, and the reason in
-        `failed`, where V does not decrease on the set or, as far as this is examined, the torque exceeds its limits."""
-        loop, J, begun, half = self.loop, self.J, list[Chain](), min(angle, pi) / 2.0
-        numbers = self.numbers | limits
-        numbers |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
-        for epsilon, V, motion, tried in self.leans:
-            motion.late = begun_late(motion, sin(half), rate)
-            rest = 2.0 * float(motion.s) * sin(angle / 4.0) ** 2
-            rest += float(np.linalg.eigvalsh(floats(motion.G)[TURN, TURN])[-1]) * sin(half) ** 2
-            level = rest + J * rate * (rate / 2.0 + epsilon * sin(half))
-            level += float(motion.late.weight * motion.late.begun**2) if motion.late else 0.0
-            motion.late = resting(motion, level * (1.0 + 1e-6))
-            begun.append(Chain(motion, V, level * (1.0 + 1e-6), tried))
-        if asks_more(begun[0].motion, begun[0].level, limits):
-            loop.failed[POINTS] = "the torque exceeds its limit"
-            return None
-        if not any(chain.decreases() for chain in begun):
-            loop.failed[POINTS] = "V does not decrease on the set from which motions start"
-            return None
-        if examined and not begins(loop, self.claim(begun[0].V, numbers | begun[0].of_level()), self.scales):
-            return None
-        return numbers, begun
+    def begun(self, angle: float, rate: float, limits: dict[str, float]) -> list[Chain]:
+        """Return chains from a start set, the first of `trials` that are any; none, and the reason in `failed`, where V does
+        not decrease on the set or the torque exceeds its limits there."""
+        loop, numbers = self.loop, self.beginning(angle, rate, limits)
+        loop.failed[POINTS] = "the torque exceeds its limit"
+        for chains in self.trials(angle, rate, limits):
+            first = chains[0]
+            if asks_more(first.motion, first.level, limits):
+                continue
+            if not any(chain.decreases() for chain in chains):
+                loop.failed[POINTS] = RISES
+            elif begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
+                return chains
+        return []
+
+    def trials(self, angle: float, rate: float, limits: dict[str, float]) -> Iterator[list[Chain]]:
+        """Yield chains to try together: one for each lean of V; or within limits one alone, by each V of which the set asks
+        for little torque, and at last by the locally best one."""
+        if not limits:
+            yield [self.chain(lean.shape, angle, rate) for lean in self.leans]
+            return
+        shapes = soft(self.sampled(self.usual[0]).motion, limits, angle, rate)
+        for shape in shapes:
+            yield [self.chain(shape, angle, rate)]
+        if (best := self.leans[0].shape) not in shapes:
+            yield [self.chain(best, angle, rate)]
+
+    def beginning(self, angle: float, rate: float, limits: dict[str, float]) -> dict[str, Any]:
+        """Return the claim's numbers of a start, without its level."""
+        begin = {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
+        return self.numbers | limits | begin
+
+    def chain(self, shape: Shape, angle: float, rate: float) -> Chain:
+        """Return a chain from the least level set of V that holds a start."""
+        _, V, motion, tried = self.sampled(shape)
+        motion.late = begun_late(motion, sin(min(angle, pi) / 2.0), rate)
+        level = largest_in(motion, angle, rate)
+        level += float(motion.late.weight * motion.late.begun**2) if motion.late else 0.0
+        level *= 1.0 + 1e-6
+        motion.late = resting(motion, level)
+        return Chain(motion, V, level, tried, shape)
 
     def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
         """Find the pointing claim of the loop, and add it. The set contains rotations of up to `angle` (rad) at up to `rate`
         (rad/s); limits: of the torque about each axis (`limit`) or its norm (`limit.norm`), or of wheels."""
-        loop, start_of = self.loop, self.begun(angle, rate, limits or {})
-        if start_of is None:
+        loop, limits = self.loop, limits or {}
+        if not self.may_begin(angle, rate, limits):
             return False
-        numbers, begun = start_of
+        numbers = self.beginning(angle, rate, limits)
+        begun = [self.chain(shape, angle, rate) for shape in self.beginnings[angle, rate, *limits.items()][0]]
         for chain in begun:
             if chain.descend() < NEARLY * chain.aim() and chain.levels:
                 break
         else:
             chain = min(begun, key=lambda one: float(Fraction(one.levels[-1]["end"])) if one.levels else inf)
         if not chain.levels:
-            loop.failed[POINTS] = "V does not decrease on the set from which motions start"
+            loop.failed[POINTS] = RISES
             return False
-        motion, start = chain.motion, Fraction(chain.level)
+        motion, start, scales = chain.motion, Fraction(chain.level), chain.scales
         chain, (angle, fastest) = chain.nearest()
         numbers |= chain.of_level()
         numbers["highest"] = float(start + motion.h / 2 * motion.swing(motion.tube(motion.region(start)))) * MORE
@@ -394,4 +271,4 @@ class Pushed:
             loop.failed[POINTS] = "motions do not come near the target"
             return False
         claim = self.claim(chain.V, numbers, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
-        return loop.try_to_show(claim, self.scales)
+        return loop.try_to_show(claim, scales)

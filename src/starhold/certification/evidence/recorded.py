@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
-from starhold.algebra.vector import apply, dot
+from starhold.algebra.vector import apply, dot, scale
 from starhold.certification.appendages import appendages, appended_motion
 from starhold.certification.evidence.finding import NotFoundError, by_digests, complete, read, unproved
+from starhold.certification.evidence.shapes import Shape
 from starhold.certification.matrices import above
 from starhold.certification.measured import driven_errors
 from starhold.certification.subject import Subject
@@ -137,6 +138,25 @@ class RecordedLoop:
         more: dict[str, Any] = {"gains": loop.gains} if s is None else {}
         digest_of = self.add(energy, measurement=ASKED, craft=self.plant, **more)
         self.written_by[digest_of] = WRITTEN | ({} if s is None else {"stiffness": s}) | {"epsilon": epsilon}
+        return digest_of
+
+    def softened(self, s: float | None, shape: Shape) -> str:
+        """Record V = w.Mw/2 + epsilon q.Mw and a share of 2 s (1 - q0), or without s of the law's own V at rest."""
+        loop, (epsilon, soft, moment) = self.loop, shape
+
+        def energy(measurement: Measurement, craft: Any, gains: Any = None) -> Any:
+            w, turn = measurement.rate, measurement.attitude
+            moved = apply(craft.inertia, w) if moment is None else scale(moment, w)
+            potential: Any = (
+                loop.law.lyapunov(measurement._replace(rate=V3), gains, craft)  # pyright: ignore
+                if s is None
+                else 2.0 * s * (1.0 - turn[0])
+            )
+            return 0.5 * dot(w, moved) + epsilon * dot(vector_part(turn), moved) + soft * potential
+
+        more: dict[str, Any] = {"gains": loop.gains} if s is None else {}
+        digest_of = self.add(energy, measurement=ASKED, craft=self.plant, **more)
+        self.written_by[digest_of] = WRITTEN | {"stiffness": s, "epsilon": epsilon, "soft": soft, "moment": moment}
         return digest_of
 
     def leaning(self, share: float) -> str:

@@ -1,0 +1,113 @@
+"""Looks for V of which the level set that holds a start asks for little torque.
+
+Of all V that decrease near the target the energy of the motion, with the law's own potential, is not the one to begin from
+limits with: its level sets hold rates that no motion from rest comes to. With a softer potential they hold lower ones.
+"""
+
+from itertools import product
+from math import sin
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.polynomial import exact
+from starhold.certification.matrices import floats
+from starhold.kernel.held import Held
+from starhold.kernel.numbers import inverse
+from starhold.kernel.regions import RATE, STATE, TURN
+from starhold.kernel.theorems.limits import allocated
+
+Array = NDArray[np.float64]
+
+SOFT = (1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35, 0.29, 0.24, 0.2)
+LEANS = (0.1, 0.18, 0.3, 0.45, 0.6, 0.75, 0.9)
+"""The shares of the potential that are tried, and epsilon in sqrt(the potential's stiffness / the largest moment)."""
+WITHIN = (0.98, 0.88, 0.75, 0.6)
+"""Shares of a limit that are tried for the torque of the linear motion: what is not linear, momentum and errors add some."""
+
+
+class Shape(NamedTuple):
+    """V = w.Mw/2 + epsilon q.Mw and a share of the potential; M is the inertia, or a moment about all axes."""
+
+    epsilon: float
+    soft: float = 1.0
+    moment: float | None = None
+
+
+def largest_in(motion: Held, angle: float, rate: float) -> float:
+    """Return a bound of V of states turned by up to an angle (rad) at up to a rate (rad/s)."""
+    return float(largest(floats(motion.form(motion.s / 2))[None], motion.even, angle, rate)[0])
+
+
+def largest(P: Array, even: bool, angle: float, rate: float) -> Array:
+    """Return for matrices on (w, q), those of V near the target, bounds of V at a start."""
+    half = min(angle, np.pi) / 2.0
+    away = sin(half) if even else 2.0 * sin(half / 2.0)
+    wide, leant, stiff = (np.linalg.norm(P[:, a, b], 2, (1, 2)) for a, b in ((RATE, RATE), (RATE, TURN), (TURN, TURN)))
+    return stiff * away**2 + wide * rate**2 + 2.0 * leant * rate * sin(half)
+
+
+def shares(motion: Held, limits: dict[str, Any]) -> Array:
+    """Return rows of which the products with the torque that is used for are shares of its limits."""
+    rows = [np.zeros((0, 3))]
+    rows += [np.eye(3) / x for name, x in limits.items() if name.startswith("limit")]
+    count = next(k for k in range(1000) if f"wheel.{k}.axis.0" not in motion.loop.claim.subject)
+    motors: list[Any] = [limits.get(f"motors.{k}") for k in range(count)]
+    if any(motors):
+        turned, _ = allocated(motion.loop, [None if x is None else exact(x) for x in motors])
+        rows.append(np.array([row / x for row, x in zip(floats(turned), motors, strict=True) if x]))
+    return np.concatenate(rows)
+
+
+def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
+    """Return for matrices P of V how definite -V' is, as a share of its diagonal, with the acceleration near the target,
+    where q is turned so far. What is left is for what is not linear, for momentum, and for what is sampled."""
+    bent = any("q0" in m and not m.isdisjoint(STATE[TURN]) for p in motion.u for m in map(frozenset, p.terms))
+    flow, turned = np.zeros(P.shape), q0[:, None, None]
+    flow[:, RATE, RATE], flow[:, RATE, TURN] = acceleration[:, RATE], acceleration[:, TURN] * (turned if bent else 1.0)
+    flow[:, TURN, RATE] = np.eye(3) / 2.0 * turned
+    slope = P @ flow
+    if not motion.even:
+        # 2 p (1 - q0) grows with q.w alone.
+        slope[:, TURN, RATE] += P[:, TURN, TURN] * (1.0 - turned) / 2.0
+    form = -(slope + slope.transpose(0, 2, 1))
+    scale = np.sqrt(np.maximum(np.einsum("nii->ni", form), 1e-300))
+    return np.linalg.eigvalsh(form / scale[:, :, None] / scale[:, None, :])[:, 0]
+
+
+def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> list[Shape]:
+    """Return shapes of V of which the level set that holds a start asks for no more than the limits, about: for each of some
+    shares those that are softened least, and of them the most definite. motion: with the potential as it is."""
+    J, torque = floats(motion.loop.given), floats(motion.near.torque)
+    potential, loads = floats(motion.form(motion.s / 2))[TURN, TURN], shares(motion, limits) @ torque
+    stiff, moment = float(np.linalg.eigvalsh(potential)[-1]), float(np.trace(J)) / 3.0
+    slow, inner = (stiff / float(np.linalg.eigvalsh(J)[-1])) ** 0.5, floats(inverse(motion.loop.given))
+    shapes = [
+        Shape(float(f"{lean * slow:.4g}"), share, about)
+        for share, lean, about in product(SOFT, LEANS, (None, float(f"{moment:.4g}")))
+    ]
+    P = np.zeros((len(shapes), 6, 6))
+    for one, shape in zip(P, shapes, strict=True):
+        M = J if shape.moment is None else shape.moment * np.eye(3)
+        one[RATE, RATE], one[TURN, TURN] = M / 2.0, shape.soft * potential
+        one[RATE, TURN] = one[TURN, RATE] = shape.epsilon / 2.0 * M
+    definite = np.linalg.eigvalsh(P)[:, 0] > 0.0
+    shapes, P = [s for s, d in zip(shapes, definite, strict=True) if d], P[definite]
+    level = largest(P, motion.even, angle, rate)
+    used = np.sqrt(level * np.einsum("li,nij,lj->nl", loads, np.linalg.inv(P), loads).max(1, initial=0.0))
+    # At rest to every side: over the rates V is least with this of q.
+    stiff = np.linalg.eigvalsh(P[:, TURN, TURN] - P[:, TURN, RATE] @ np.linalg.solve(P[:, RATE, RATE], P[:, RATE, TURN]))
+    far = level / stiff[:, 0]
+    least = np.sqrt(np.maximum(1.0 - far, 0.0)) if motion.even else 1.0 - far / 2.0
+    margins = np.minimum(*(falls(motion, P, inner @ torque, q0) for q0 in (np.ones(len(P)), least)))
+    margins[least <= -(not motion.even)] = -np.inf
+    chosen = dict[Shape, None]()
+    softness, ball = np.array([s.soft for s in shapes]), np.array([s.moment is not None for s in shapes])
+    for share, about in product(WITHIN, (False, True)):
+        fit = (used < share) & (margins > 0.0) & (ball == about)
+        # About all axes alike the gyroscopic torque does work: there the most definite one is taken.
+        fit &= about | (softness == softness[fit].max(initial=0.0))
+        if fit.any():
+            chosen[shapes[int(np.argmax(np.where(fit, margins, -np.inf)))]] = None
+    return list(chosen)
