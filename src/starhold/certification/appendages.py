@@ -83,13 +83,17 @@ def tells_momentum(loop: ClosedLoop, fitted: Fitted) -> bool:
         return False
     params = fitted.prepared(loop.period)
     state = fitted.remembered(params)
-    stored = straight_line(lambda state: measured(state, params), state=state)
+
+    def read(state: Any) -> Any:
+        return measured(state, params)
+
+    stored = straight_line(read, state=state)
     try:
         law = law_program(loop.law, loop.gains, loop.known, loop.period, loop.remembers)
     except (InputError, UnreadableError):
         return True
     reads = any(name.startswith(TOLD_MOMENTUM) for name in law["inputs"])
-    return reads and (bool(stored["inputs"]) or any(measured(state, params)))
+    return reads and (bool(stored["inputs"]) or any(read(state)))
 
 
 def _alone(loop: ClosedLoop) -> ClosedLoop:

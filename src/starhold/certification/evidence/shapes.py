@@ -45,7 +45,7 @@ def largest(P: Array, even: bool, angle: float, rate: float) -> Array:
     half = min(angle, np.pi) / 2.0
     away = sin(half) if even else 2.0 * sin(half / 2.0)
     wide, leant, stiff = (np.linalg.norm(P[:, a, b], 2, (1, 2)) for a, b in ((RATE, RATE), (RATE, TURN), (TURN, TURN)))
-    return stiff * away**2 + wide * rate**2 + 2.0 * leant * rate * sin(half)
+    return np.asarray(stiff * away**2 + wide * rate**2 + 2.0 * leant * rate * sin(half), dtype=np.float64)
 
 
 def shares(motion: Held, limits: dict[str, Any]) -> Array:
@@ -87,13 +87,13 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> lis
         Shape(float(f"{lean * slow:.4g}"), share, about)
         for share, lean, about in product(SOFT, LEANS, (None, float(f"{moment:.4g}")))
     ]
-    P = np.zeros((len(shapes), 6, 6))
-    for one, shape in zip(P, shapes, strict=True):
+    forms = np.zeros((len(shapes), 6, 6))
+    for one, shape in zip(forms, shapes, strict=True):
         M = J if shape.moment is None else shape.moment * np.eye(3)
         one[RATE, RATE], one[TURN, TURN] = M / 2.0, shape.soft * potential
         one[RATE, TURN] = one[TURN, RATE] = shape.epsilon / 2.0 * M
-    definite = np.linalg.eigvalsh(P)[:, 0] > 0.0
-    shapes, P = [s for s, d in zip(shapes, definite, strict=True) if d], P[definite]
+    definite = np.linalg.eigvalsh(forms)[:, 0] > 0.0
+    shapes, P = [s for s, d in zip(shapes, definite, strict=True) if d], forms[definite]
     level = largest(P, motion.even, angle, rate)
     used = np.sqrt(level * np.einsum("li,nij,lj->nl", loads, np.linalg.inv(P), loads).max(1, initial=0.0))
     # At rest to every side: over the rates V is least with this of q.
