@@ -254,6 +254,15 @@ class Follower(Reader):
         changed = norm(tube.end) / (1 - self.late.kept) + 2 * self.swayed[0]
         return felt(self.heeded, "w", tube.sizes) * (min(2 * fast, changed) + 2 * self.apart[0])
 
+    def spun_on(self, tube: Tube, spun: Fraction, fast: Fraction) -> Fraction:
+        """Return how large the torque is at most in the mean of a period that the drift of the rates has beside that of the
+        linear motion, as what is asked for of momentum and the rate acts late: A has that torque in the drift by as much as it
+        acts, and samples by all of it. spun: what `spun_late` returns."""
+        if not (self.inexact and self.late):
+            return ZERO
+        rate = self.swayed[0] if fast else tube.region.sizes[SPEED]
+        return self.late.mean * (spun + felt(self.heeded, "w", tube.sizes) * rate)
+
     def paced(self, tube: Tube, pulled: Fraction, torque: Fraction | None = None) -> Fraction:
         """Return how large the acceleration is in the mean of a period, of a linear motion for which as much is asked as
         `pulled`, with a torque of no more than that, or as told."""

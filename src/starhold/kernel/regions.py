@@ -13,7 +13,7 @@ from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, time
 from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
-RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
+RATE, TURN, ITERATIONS, HUGE = slice(0, 3), slice(3, 6), 60, 1 << 64
 SPEED, ANGLE, PULL, LOAD = "|w", "|q", "|u", "|j"
 """Under which the sizes have those of |w| and |q|, of the acceleration that is linear in the state where it is known, and in
 a tube of the torque that an inertia near the given one adds."""
@@ -219,4 +219,7 @@ def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Frac
         if all(x <= y for x, y in zip(further, bounds, strict=True)):
             return bounds
         bounds = [up(x + x / 2**20) for x in further]
+        # Bounds that only grow would become numbers too long to go on with.
+        if max(bounds) > HUGE:
+            break
     raise RefusedError("the period is too long for the rates")
