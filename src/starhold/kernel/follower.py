@@ -255,9 +255,9 @@ class Follower(Reader):
         return felt(self.heeded, "w", tube.sizes) * (min(2 * fast, changed) + 2 * self.apart[0])
 
     def spun_on(self, tube: Tube, spun: Fraction, fast: Fraction) -> Fraction:
-        """Return how large the torque is at most in the mean of a period that the drift of the rates has beside that of the
-        linear motion, as what is asked for of momentum and the rate acts late: A has that torque in the drift by as much as it
-        acts, and samples by all of it. spun: what `spun_late` returns."""
+        """Return a bound of the torque, in the mean of a period, by which the drift of the rates is not that of the linear
+        motion, because what momentum and a rate ask for acts late: A has of this what acts, and samples have all of it.
+        spun: what `spun_late` returns."""
         if not (self.inexact and self.late):
             return ZERO
         rate = self.swayed[0] if fast else tube.region.sizes[SPEED]
