@@ -28,6 +28,7 @@ from starhold.analysis.pointing import MEANINGS
 from starhold.analysis.ranking import Measure
 from starhold.analysis.rigid_body import make_meter
 from starhold.certification.unmodelled import READ
+from starhold.cli.arguments import clause
 from starhold.cli.main import app
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Card, Gain, Measurement, Start
@@ -184,9 +185,9 @@ def metrics_table(measures: Mapping[str, Measure]) -> str:
 
 
 def commands_table() -> str:
-    """The commands with the first sentence of their help."""
+    """The commands with the first clause of their help."""
     known = typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
-    rows = [[f"`starhold {name}`", re.split(r"(?<=[.:])\s|\.$", command.help)[0].rstrip(":.")] for name, command in known]
+    rows = [[f"`starhold {name}`", clause(command.help)] for name, command in known]
     return table(["command", "purpose"], rows)
 
 

@@ -266,7 +266,7 @@ def test_missing_files_name_the_nearest(tmp_path):
         parse("claim = []\n" + GOOD.partition("[[claim]]")[0], "x")
     binary = tmp_path / "b.toml"
     binary.write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match="readable text file"):
+    with pytest.raises(InputError, match="cannot be read"):
         load(binary)
 
 

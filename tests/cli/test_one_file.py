@@ -89,7 +89,7 @@ def told(folder):
 
 def test_the_command_line_has_a_command_from_one_file(folder, told):
     assert "tell-gains" in told["all"][1]
-    assert "Tell the gains." in told["all"][1]
+    assert "Tell the gains" in told["all"][1]
     assert "--for-so-long" in told["help"][1]
     code, text = told["done"]
     assert code == 0, text
@@ -107,7 +107,7 @@ def test_the_command_line_has_a_command_from_one_file(folder, told):
 
 
 def test_a_command_that_is_a_function_is_one_file_too(told):
-    assert told["all"][1].index("schema") < told["all"][1].index("Say a word.")
+    assert told["all"][1].index("schema") < told["all"][1].index("Say a word")
     assert told["said"] == [0, "so so\n"]
 
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import partial
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,16 +14,18 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib import mathtext
+from matplotlib.axis import Tick
 from matplotlib.figure import Figure
+from PIL import Image
 
 from starhold.algebra.cosines import to_angles
 from starhold.analysis.rigid_body import METRICS
 from starhold.report.attitude_plots import KNOWN, collect, early, roll_pitch_yaw, until
 from starhold.report.body import report_of
-from starhold.report.figures import WORD_ROWS, png, sharing_axes, word_rows
+from starhold.report.figures import WORD_ROWS, plain, png, sharing_axes, word_rows
 from starhold.report.plots import COLOURS, Mark, colour, recorded_plots, thin, thin_times
 from starhold.report.text import number_text
-from starhold.report.ticks import as_text, label_ticks
+from starhold.report.ticks import Ticks, as_text, label_ticks
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from starhold.simulation.lane import Recording, fly, label
@@ -93,12 +96,12 @@ RANGES = [[0.25, 1.0], [1e5 + 1e-7, 1e5 + 3e-7], [2e-9, 4e12], [2e-3, 5e-3]]
 )
 def test_ticks_say_in_plain_text_what_their_formulas_say(log: bool, values: list[float]) -> None:
     texts = list[list[str]]()
-    for plain in (True, False):
+    for in_plain_text in (True, False):
         figure = Figure()
         axis = figure.subplots()
         axis.plot([0.0, 1.0], values)
         axis.set_yscale("log" if log else "linear")
-        if plain:
+        if in_plain_text:
             label_ticks(axis.yaxis, log)
         elif not log:
             axis.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
@@ -108,6 +111,52 @@ def test_ticks_say_in_plain_text_what_their_formulas_say(log: bool, values: list
     assert texts[0] == [as_text(text) for text in texts[1]]
     assert any(texts[0])
     assert not re.search(r"[$\\^{}]", "".join(texts[0]))
+
+
+@pytest.mark.parametrize(
+    ("log", "values", "end"),
+    [
+        (False, [-3e-7, 2e-6], 3e7),
+        (True, [0.3, 0.31], 1.0),
+        *((log, values, 2.0) for log in (False, True) for values in RANGES),
+    ],
+)
+@pytest.mark.usefixtures("quiet_plots")
+def test_an_axis_is_drawn_as_matplotlib_draws_it(log: bool, values: list[float], end: float) -> None:
+    drawn = list[Any]()
+    for by_one_tick in (False, True):
+        figure = Figure((8.0, 3.0))
+        axes = figure.subplots(2, 1, sharex=True)
+        for axis in axes:
+            plain(axis)
+            for one in (axis.xaxis, axis.yaxis) if by_one_tick else ():
+                Ticks(one)
+            axis.plot([0.0, end], values)
+            axis.set_yscale("log" if log else "linear")
+            label_ticks(axis.yaxis, log)
+        axes[0].set_ylabel("y")
+        axes[1].set_xlabel("x")
+        file = BytesIO()
+        figure.savefig(file, format="png")
+        drawn.append((np.asarray(Image.open(file)), np.asarray(Image.open(BytesIO(png(figure))))))
+    # A file also has the pixels of the library's own.
+    first = drawn[0][0]
+    assert all((one == first).all() for pair in drawn for one in pair)
+    assert (first[..., :3] < 128).any()
+
+
+def test_figures_make_no_tick_for_each_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Tick] = []
+    begin = Tick.__init__
+
+    def noted(tick: Tick, *given: Any, **more: Any) -> None:
+        made.append(tick)
+        begin(tick, *given, **more)
+
+    monkeypatch.setattr(Tick, "__init__", noted)
+    draw(flown.flights(), tmp_path, flown.scenario())
+    # At most two, a major and a minor one, for each of the sixteen axes of four layouts.
+    assert 16 <= len(made) <= 32
 
 
 @pytest.mark.slow

@@ -1,6 +1,8 @@
 """The process that draws: it starts before there is anything to draw, and its end is told."""
 
 import os
+import subprocess
+import sys
 from functools import partial
 from types import SimpleNamespace
 
@@ -33,6 +35,11 @@ def test_it_has_loaded_its_library_before_there_is_anything_to_draw(early, pictu
         painter.draw(SimpleNamespace(body=""), [], tmp_path)
         with pytest.raises(RuntimeError, match="ZeroDivisionError"):
             painter.finish()
+
+
+def test_it_loads_without_writing_documentation_that_nobody_reads():
+    code = "from starhold.report import painter; painter._load(); from matplotlib.axes import Axes; print(Axes.set.__doc__)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "None\n"
 
 
 def test_one_that_has_died_is_told_and_not_waited_for(early, pictures, tmp_path):

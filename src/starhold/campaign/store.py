@@ -77,7 +77,9 @@ class Store:
                 raise InputError(str(folder), "", given, "another folder with -o, or --force")
             _clear(folder)
         except OSError as error:
-            raise InputError(str(folder), "", f"cannot write there: {error.strerror}", "a folder you may write to") from None
+            raise InputError(
+                str(folder), "", "", f"cannot write there: {error.strerror}; name another folder with -o"
+            ) from None
         store = cls(folder, replace(manifest, columns={}), writing=True)
         store._write_manifest()
         return store

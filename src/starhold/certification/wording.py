@@ -9,7 +9,7 @@ from typing import Any, cast
 from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS
 from starhold.certification.certificate import FILE, ORBIT, STEADY, UNTIL, Certificate, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
-from starhold.certification.rounding import angle, shown, speed
+from starhold.certification.rounding import angle, growing, shown, speed
 from starhold.laws.catalogue import file_of, known_law
 
 HEADINGS = {
@@ -227,13 +227,13 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
 
     def pushed(name: str) -> str:
-        more = f" and {shown(growing, ' N m s')} times the body's rate" if (growing := n[f"{name}_per_rate"]) else ""
+        more = f" and {shown(grown, ' N m s')} times the body's rate" if (grown := n[f"{name}_per_rate"]) else ""
         return f"of up to {shown(n[name], ' N m')}{more}"
 
     random = f", random ones of up to {shown(n['random_torque'], ' N m')}" if "random_torque" in n else ""
     bounds = [f"torques from outside {pushed('torque')}{' beside those that the law is told' * bool(n['told'])}{random}"]
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name] > 1e-12]
-    bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
+    bounds += [*growing(n.get("told_growth")), *([f"errors of the command {pushed('error')}"] if n["error"] else [])]
     bounds += [f"a lag of the torque, at first of up to {shown(n['late_torque'], ' N m')}"] if "late_torque" in n else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
     bounds[-1] += " of the inertia as given" * ("momentum" in n and "tolerance" in n)
@@ -274,17 +274,13 @@ def _detumbling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "rates" not in n:
         return "the energy falls where the magnetic field turns in the body"
 
-    def most(name: str, unit: str, size: float = 1.0) -> str:
-        return listed([shown(size * x, unit, up=True) for x in n[name]])
-
-    falls = [f"{speed(m, True)} at up to {speed(rate)}" for m, rate in zip(n["turning"], n["rates"], strict=True)]
+    # Rates between, by how much the energy rises and for how long the field turns fast are in the certificate.
+    ends = sorted({0, len(n["rates"]) - 1})
+    falls = [f"{speed(n['turning'][k], True)} up to {speed(n['rates'][k])}" for k in ends]
     return (
-        f"the energy falls in each control period of {n['period']:.12g} s in which the field turns in the body by more than"
-        f" {listed(falls)}, and else rises by up to {most('rise', ' W')}; it turns by more than"
-        f" {most('often', '°/s', math.degrees(1.0))} for at most {most('spell', ' s')} and {most('shares', ' %', 100.0)} of"
-        f" the time; with a field of at least {shown(n['field'], ' T', True)} that changes by up to"
-        f" {shown(100.0 * n['field_change'], ' %')} a second, and torques from outside of up to"
-        f" {shown(n['torque'], ' N m')} and, across the field, {shown(n['torque_across'], ' N m')}"
+        f"energy falls in each control period in which the field turns in the body by over {', '.join(falls)}; field ≥"
+        f" {shown(n['field'], ' T', True)}, changing ≤ {shown(100.0 * n['field_change'], ' %')}/s; torques ≤"
+        f" {shown(n['torque'], ' N m')}, across it {shown(n['torque_across'], ' N m')}"
     )
 
 

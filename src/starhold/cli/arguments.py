@@ -1,5 +1,6 @@
 """Arguments and exit codes that several commands share."""
 
+import re
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,6 +10,11 @@ import typer
 USER_ERROR, DIVERGED, FAILED_CHECK, REFUTED, UNDECIDED, INTERNAL_ERROR = 2, 1, 1, 3, 4, 70
 
 ScenarioFile = Annotated[str, typer.Argument(metavar="FILE", help="a scenario file or the name of a built-in scenario")]
+
+
+def clause(text: str) -> str:
+    """Return the first clause of a command's help, for lists of commands, which would break off in the middle of a word."""
+    return " ".join(re.split(r"(?<=[.:;])\s", text.strip(), maxsplit=1)[0].split()).rstrip(".:;")
 
 
 def results_in(where: str) -> Any:

@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
 
 WIDE = 120
-console = Console(highlight=False)
+console = Console(highlight=False, emoji=False)
 if not console.is_terminal:
     # A file or a pipe has no width limit.
-    console = Console(width=WIDE, highlight=False)
+    console = Console(width=WIDE, highlight=False, emoji=False)
 
 
 def bars_with(*columns: ProgressColumn | str) -> Progress:

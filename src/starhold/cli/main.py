@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import signal
@@ -9,13 +10,14 @@ import sys
 import traceback
 import warnings
 from collections.abc import Mapping
+from threading import active_count
 from types import ModuleType
 from typing import Annotated, Any, cast
 
 import typer
 
 from starhold.cli import commands
-from starhold.cli.arguments import INTERNAL_ERROR, USER_ERROR
+from starhold.cli.arguments import INTERNAL_ERROR, USER_ERROR, clause
 from starhold.cli.process import Outlet, on_signal, open_outlets
 from starhold.errors import InputError, InterruptedByUserError
 
@@ -30,9 +32,11 @@ def make_app(every: Mapping[str, Any]) -> typer.Typer:
     )
     for name, command in every.items():
         if isinstance(command, typer.Typer):
-            made.add_typer(command, name=name)
+            for one in command.registered_commands:
+                one.short_help = clause(one.callback.__doc__ or "")
+            made.add_typer(command, name=name, short_help=clause(str(command.info.help)))
         else:
-            made.command(name)(command)
+            made.command(name, short_help=clause(command.__doc__ or ""))(command)
     made.callback(invoke_without_command=True)(_root)
     return made
 
@@ -62,9 +66,13 @@ def main() -> None:
     if unsaid is not None and not isinstance(unsaid, BrokenPipeError):
         print(f"starhold: standard output cannot be written: {unsaid.strerror}", file=sys.stderr)
         code = code or USER_ERROR
-    # At exit the interpreter would search all loaded objects several times for garbage.
-    gc.freeze()
-    sys.exit(code)
+    if active_count() > 1:
+        sys.exit(code)
+    # The interpreter would take all loaded modules apart before it ends, which takes longer than `--help`.
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def run_command() -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -118,12 +117,21 @@ class Follower(Reader):
     leaning: list[Poly]
     apart: Radii
     swayed: Radii
+    leant: Radii
     late: Late | None
 
+    def sways(self, radii: list[Fraction]) -> None:
+        """Take in what noise adds near the target: rate, turn and the torque that acts, if it lags, and then what momentum
+        makes of these."""
+        count = len(self.near.A) // 3
+        (w, q, *torque), (faster, farther, *more) = radii[:count], radii[count:] or [ZERO] * count
+        self.swayed, self.apart = (w, q), (faster, farther)
+        self.drawn = (torque[0], more[0]) if torque else AT_REST
+
     @property
-    @abstractmethod
     def away(self) -> Radii:
         """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
+        return self.swayed[0] + self.leant[0], self.swayed[1] + self.leant[1]
 
     def follow(self, numbers: Numbers) -> Late | None:
         """Read how late the torque is, if it is."""

@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
@@ -110,9 +110,14 @@ def telling(readings: Iterable[str]) -> list[Fitted]:
 
 
 @cache
-def entries(group: str) -> tuple[EntryPoint, ...]:
-    """Return the entry points of all installed packages in a group. Packages are searched once, not for each role."""
-    return tuple(entry_points(group=group))
+def _offered() -> Any:
+    """Return the entry points of all installed packages. Packages are searched once, not for each role."""
+    return entry_points()
+
+
+def entries(group: str) -> EntryPoints:
+    """Return the entry points of all installed packages in a group."""
+    return _offered().select(group=group)
 
 
 def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str, AnyPart]:

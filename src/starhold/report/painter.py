@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 
-LIBRARY = ("matplotlib.backends.backend_agg", "matplotlib.figure", "starhold.report.ticks", "starhold.report.accuracy")
+DRAWING = ("matplotlib.backends.backend_agg", "matplotlib.figure", "starhold.report.ticks", "starhold.report.accuracy")
 """The modules needed to draw figures, in addition to `starhold.report.figures`."""
+SHARED = "numpy"
+"""Loaded before the process starts, because both need it at once."""
 
 
 class Painter:
@@ -39,6 +41,7 @@ class Painter:
             self._start()
 
     def _start(self) -> None:
+        import_module(SHARED)
         context: Any = get_context("fork" if can_fork() else "spawn")
         (self._failures, self._failed), (requests, self._requests) = (context.Pipe(duplex=False) for _ in range(2))
         self._process = context.Process(target=_draw, args=(requests, self._failed, self._requests))
@@ -92,10 +95,9 @@ def _draw(requests: Connection, failures: Connection, other: Connection) -> None
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     gc.disable()
     try:
+        _load()
         from starhold.report.figures import paint
 
-        for name in LIBRARY:
-            import_module(name)
         picture, folder = requests.recv()
         paint(picture, folder)
     except EOFError:
@@ -104,3 +106,14 @@ def _draw(requests: Connection, failures: Connection, other: Connection) -> None
         failures.send(error)
     except Exception:
         failures.send(traceback.format_exc()[-2000:])
+
+
+def _load() -> None:
+    """Load all that draws. While it loads, Matplotlib writes the documentation of its classes, which takes half the time and
+    which nobody reads here."""
+    from matplotlib import artist
+
+    artist.kwdoc = lambda artist: ""
+    artist.Artist._update_set_signature_and_docstring = lambda: None  # pyright: ignore[reportAttributeAccessIssue]
+    for name in DRAWING:
+        import_module(name)

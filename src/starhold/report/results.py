@@ -61,7 +61,7 @@ def open_folder(folder: Path, force: bool) -> Path:
         raise InputError(str(folder), "", "another starhold is writing there", "another folder with -o") from None
     except OSError as error:
         shown = cut(str(folder), LONGEST_PATH)
-        raise InputError(shown, "", f"cannot write there: {error.strerror}", "a folder you may write to") from None
+        raise InputError(shown, "", "", f"cannot write there: {error.strerror}; name another folder with -o") from None
     if marks:
         _clear(folder)
     return folder

@@ -172,8 +172,8 @@ def _read_text(source: str | Path) -> tuple[str, str, Path]:
         known = nearest(where, builtin_names())
         raise InputError(where, "", "no such file", f"a scenario file, or a built-in scenario: {known}") from None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or type(error).__name__
-        raise InputError(where, "", reason, "a readable text file") from None
+        reason = getattr(error, "strerror", None) or "it is no text in UTF-8"
+        raise InputError(where, "", "", f"cannot be read: {reason}") from None
 
 
 def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:

@@ -1,11 +1,12 @@
 """Flies many trajectories at once: blocks of lanes, divided among threads."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from starhold.loop.programs import CHUNK, make_halves
 from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
 PIECES = 4
 """Pieces of a batch per thread; between them progress is reported and an interrupt takes effect. Each piece also computes
 the numbers common to all lanes."""
@@ -27,6 +31,8 @@ class ThreadPool:
     """A pool of threads for a `with` block; work that has not begun at its end is dropped."""
 
     def __init__(self, threads: int | None = None) -> None:
+        from concurrent.futures import ThreadPoolExecutor
+
         self.threads = max(1, os.cpu_count() or 1 if threads is None else threads)
         self._pool = ThreadPoolExecutor(self.threads)
 

@@ -25,14 +25,14 @@ from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
 from starhold.certification.matrices import above, floats
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
+from starhold.certification.unmodelled import Pushes, change_of_modelled
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand, plus, times, transpose
 from starhold.kernel.plans import Plan
 from starhold.kernel.regions import TURN, Tube, balls
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread
+from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
 from starhold.kernel.theorems.response import first_of, responds
 from starhold.parts.craft import tensor
 
@@ -91,19 +91,21 @@ class Chain:
         late = of_late(self.motion.late)
         if self.motion.plan is None:
             return {"level": self.level} | late
-        off = self.motion.planned(self.motion.region(Fraction(self.level)).sizes)
+        region = self.motion.region(Fraction(self.level))
+        off = self.motion.planned((self.motion.tube(region).region if self.motion.grows else region).sizes)
         return {"level": self.level} | late | {"plan.error": float(off) * MORE}
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
-        c = Fraction(self.level)
+        c, tube = Fraction(self.level), None
         while len(self.levels) < LEVELS and (lower := self.lower(c)) is not None:
             tau, beta, floor = lower
             end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
             if end > c * Fraction(9, 10):
                 break
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
-            self.samples += periods(self.motion.h * beta, floor, c, end) + on_level(self.motion, end)[1]
+            tube, more = on_level(self.motion, end, tube or self.motion.tube(self.motion.region(c)))
+            self.samples += periods(self.motion.h * beta, floor, c, end) + more
             c = end
         return float(c)
 
@@ -158,6 +160,7 @@ class Chain:
             rate = max(highest_ratio(after, X) for after in moved)
             reach = highest_ratio(entered, X)
             inner = self.motion.tube(within.region.within(X, away))
+            more += waited(self.motion, within, inner)
             end = ends(self.motion, inner, X, away)
             if rate >= 1.0 or end[0] > angle * 0.99:
                 if not heed:
@@ -165,14 +168,8 @@ class Chain:
                 heed = 0.0
                 continue
             self.samples += more
-            self.ellipsoids.append(
-                {
-                    "shape": [[str(x) for x in row] for row in X],
-                    "shares": [str(x) for x in a],
-                    "rate": str(Fraction(rate)),
-                    "reach": str(Fraction(reach)),
-                }
-            )
+            one = {"shape": [[str(x) for x in row] for row in X], "shares": [str(x) for x in a]}
+            self.ellipsoids.append(one | {"rate": str(Fraction(rate)), "reach": str(Fraction(reach))})
             room = 1 - sum(a)
             fall = 1 - Fraction(rate) * room
             self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
@@ -200,6 +197,7 @@ class Chain:
             try:
                 within, more = forgotten(motion, tube)
                 begun, pulled, inner = response.after(motion, within, begun, pulled)
+                more += waited(motion, within, inner)
             except RefusedError:
                 break
             end = ends(self.motion, inner, balls(begun), motion.away)
@@ -221,7 +219,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
         beyond = list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
-        kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
+        kinds = [True] * loop.known.noisy + [False]
     else:
         turn, rate = (float(Fraction(like.get(f"start.{name}", like.get(name, 0)))) for name in ("angle", "rate"))
         tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, list[float]())]
@@ -263,7 +261,8 @@ class Pushed:
         # The law's own potential has no force beside the law's, however far from the target.
         self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
-        demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
+        bounded = all(map(isfinite, against.numbers.values()))
+        demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
         self.larger, self.refused = list[tuple[float, float, str]](), dict[tuple[Any, ...], str]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}

@@ -89,8 +89,8 @@ def load(source: str | Path) -> InvariantProblem:
         known = _nearest(str(source), builtin_names())
         raise InputError(str(source), "", "no such file", f"a file with a system, or a built-in one: {known}") from None
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or type(error).__name__
-        raise InputError(str(source), "", str(reason), "a readable text file") from None
+        reason = getattr(error, "strerror", None) or "it is no text in UTF-8"
+        raise InputError(str(source), "", "", f"cannot be read: {reason}") from None
     return parse(text, str(source))
 
 
@@ -100,7 +100,7 @@ def parse(text: str, where: str) -> InvariantProblem:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         # Also of whole numbers of too many digits, and of lists too deep in one another.
-        raise InputError(where, "", f"not TOML: {error}", "a TOML file") from None
+        raise InputError(where, "", "", f"not TOML: {error}") from None
     return _File(where, data).problem()
 
 

@@ -162,7 +162,8 @@ def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
     # Some frames of a short run would be equal; each sample shows once.
     end = early(flights)
     power = EARLY if end is None else max(EARLY, math.log(end / float(longest[-1])) / math.log(0.5))
-    places = np.unique(np.rint((len(longest) - 1) * np.linspace(0.0, 1.0, FRAMES + 1) ** power).astype(int))
+    frames = np.rint((len(longest) - 1) * np.linspace(0.0, 1.0, FRAMES + 1) ** power).astype(int)
+    places = np.array(list(dict.fromkeys(frames.tolist())))
     attitudes: list[list[list[float | None]]] = []
     for flight in flights:
         q = flight.recording["attitude_error"]

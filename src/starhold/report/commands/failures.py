@@ -14,17 +14,15 @@ if TYPE_CHECKING:
 
 
 def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) -> Result:
-    """Return the result: a row per loss, with gains only where they were redesigned."""
+    """Return the result: a row per loss, then what is lost without which wheels, and the gains that were redesigned."""
     from starhold.laws.modes import mode_laws
     from starhold.report.text import number_text
 
-    flown = [failure.gains for failure in failures if failure.gains is not None]
-    retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
-    # The number of losses until the mode for them begins is not a gain.
-    retuned = [name for name in retuned if name != "wheels_lost"]
+    flown = [(failure.name, failure.gains) for failure in failures if failure.gains is not None]
     sentences: list[str] = []
-    if any(not failure.controllable for failure in failures):
-        sentences.append("not (x, y, z): no control torque remains about this body direction.")
+    for failure in failures:
+        if not failure.controllable:
+            sentences.append(f"without {failure.name}: no control torque remains about {_directions(failure)}")
     sentences += [f"without {failure.name} not flown: {failure.refused}" for failure in failures if failure.refused]
     if any(failure.certified is not None for failure in failures):
         sentences.append("certified: slews from rest for which it is proved that no motor or wheel reaches its limit.")
@@ -36,14 +34,21 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
             "not settled: judged at the end of the flight, for the target of the mode active then; to judge a single mode, "
             "give it as a [[law]] of its own and name it by --law."
         )
-    if not retuned:
+    texts = {name: [number_text(gains[name], 4) for _, gains in flown] for name in flown[0][1]}
+    # The number of losses until the mode for them begins is not a gain.
+    changed = [name for name, every in texts.items() if len({*every}) > 1 and name != "wheels_lost"]
+    for name in changed:
+        lost = {
+            text: [case for (case, _), other in zip(flown, texts[name], strict=True) if other == text]
+            for text in texts[name]
+        }
+        sentences.append(f"{name}: {', '.join(f'{text} {_cases(names)}' for text, names in lost.items())}")
+    if not changed:
         sentences.append("The gains are the same in all of them.")
     if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in failures):
         sentences.append("~ extrapolated from the growth of the momentum late in the flight.")
     title = f"{scenario.name}, {entry.name}: loss of wheels"
-    return Result(
-        title, ["", _table(failures, retuned), *sentences], _numbers(failures, entry), lambda: draw(failures, title)
-    )
+    return Result(title, ["", _table(failures), *sentences], _numbers(failures, entry), lambda: draw(failures, title))
 
 
 def _numbers(failures: Sequence[Failure], entry: LawEntry) -> Table:
@@ -86,14 +91,19 @@ def _cells(failure: Failure) -> dict[Any, Any]:
     }
 
 
-def _table(failures: Sequence[Failure], retuned: Sequence[str]) -> Table:
-    designed = failures[0].eta is not None
-    columns = [Column("lost"), Column("axes"), Column("cond.", "", ".3g")]
-    columns += [Column("authority", "N m", ".4g"), Column("share", "%", ".1f"), *(Column(name, "", ">") for name in retuned)]
-    columns += [Column("stability", "1/s, before → after", ">")] * designed
+def _table(failures: Sequence[Failure]) -> Table:
+    """Return what tells whether a loss is survived, narrow enough for a small screen; all else is in the file."""
+    columns = [Column("lost"), Column("axes", "left", ">"), Column("authority", "N m", ".4g"), Column("share", "%", ".1f")]
     columns += [Column("certified", "turn, °", ">"), Column("settling", "s", ".4g"), Column("wheel full", "min", ">")]
     columns += [Column("proved", "within, °", ">")] * (failures[0].proof is not None)
-    return Table(columns, [[failure.name, *_row(failure, retuned, designed), *_proved(failure)] for failure in failures])
+    return Table(columns, [[failure.name, *_row(failure), *_proved(failure)] for failure in failures])
+
+
+def _cases(names: Sequence[str]) -> str:
+    """Return losses of these names as text."""
+    lost = [name for name in names if name != "none"]
+    listed = " or ".join([", ".join(lost[:-1]), *lost[-1:]][len(lost) < 2 :])
+    return " and ".join(["with all wheels"] * (len(lost) < len(names)) + [f"without {listed}"] * bool(lost))
 
 
 def _proved(failure: Failure) -> list[str | None]:
@@ -103,20 +113,18 @@ def _proved(failure: Failure) -> list[str | None]:
     return [] if proof is None else [None if proof.angle is None else shown(math.degrees(proof.angle), up=True)]
 
 
-def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[Any]:
+def _row(failure: Failure) -> list[Any]:
     from starhold.certification.rounding import shown
-    from starhold.report.text import number_text
 
-    axes = "three" if failure.controllable else f"[red]not {_directions(failure)}[/red]"
-    begun = [axes, failure.condition, failure.authority, 100.0 * failure.share]
+    axes = str(3 - len(failure.lacking))
+    begun = [axes if failure.controllable else f"[red]{axes}[/red]", failure.authority, 100.0 * failure.share]
     if failure.gains is None:
-        return [*begun, *[None] * (len(retuned) + designed + 3)]
-    eta = [f"{failure.eta_intact:.4g} → {failure.eta:.4g}"] if designed else []
+        return [*begun, None, None, None]
     certified = None if failure.certified is None else shown(math.degrees(failure.certified[0]))
     settling = "not settled" if failure.settling is None else failure.settling
     if failure.diverged_at is not None:
         settling = f"[red]diverged at {failure.diverged_at:.4g}[/red]"
-    return [*begun, *(number_text(failure.gains[name], 4) for name in retuned), *eta, certified, settling, _full(failure)]
+    return [*begun, certified, settling, _full(failure)]
 
 
 def _full(failure: Failure) -> str | None:
