@@ -262,6 +262,15 @@ class Follower(Reader):
         changed = norm(tube.end) / (1 - self.late.kept) + 2 * self.swayed[0]
         return felt(self.heeded, "w", tube.sizes) * (min(2 * fast, changed) + 2 * self.apart[0])
 
+    def spun_on(self, tube: Tube, spun: Fraction, fast: Fraction) -> Fraction:
+        """Return a bound of the torque, in the mean of a period, by which the drift of the rates is not that of the linear
+        motion, because what momentum and a rate ask for acts late: A has of this what acts, and samples have all of it.
+        spun: what `spun_late` returns."""
+        if not (self.inexact and self.late):
+            return ZERO
+        rate = self.swayed[0] if fast else tube.region.sizes[SPEED]
+        return self.late.mean * (spun + felt(self.heeded, "w", tube.sizes) * rate)
+
     def paced(self, tube: Tube, pulled: Fraction, torque: Fraction | None = None) -> Fraction:
         """Return how large the acceleration is in the mean of a period, of a linear motion for which as much is asked as
         `pulled`, with a torque of no more than that, or as told."""

@@ -365,12 +365,14 @@ class Held(Follower):
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         near = region.sizes | {"v": turn * turn}
         odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
-        odd += self.spun_late(tube, fast)
+        spun = self.spun_late(tube, fast)
+        odd += spun
         # What noise adds has in it what momentum makes of it, but not what it makes of that.
         noisy = felt(self.heeded, "w", near) * self.noise[1] * self.light
         at_ends, along, uneven = self.ends(tube)
         drift = norm(self.astray(tube, self.lasting + tube.steady - tube.uneven + tube.late.moved - uneven))
         drift += h * (self.paced(tube, pulled) + self.paced(tube, self.pulled(self.apart), self.drawn[1]) + noisy)
+        drift += h * self.light * self.spun_on(tube, spun, fast)
         growing = "rh" + "e" * (self.gradual(tube.sizes) < 2 * self.size("e"))
         late = self.stale(tube.sizes, self.beside, letters=growing)
         steady = tube.uneven - self.lasting + tube.pushed - self.random + odd + tube.stale - late
