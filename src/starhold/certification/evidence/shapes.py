@@ -73,7 +73,7 @@ def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
         slope[:, TURN, RATE] += P[:, TURN, TURN] * (1.0 - turned) / 2.0
     form = -(slope + slope.transpose(0, 2, 1))
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", form), 1e-300))
-    return np.linalg.eigvalsh(form / scale[:, :, None] / scale[:, None, :])[:, 0]
+    return np.asarray(np.linalg.eigvalsh(form / scale[:, :, None] / scale[:, None, :])[:, 0], dtype=np.float64)
 
 
 def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> list[Shape]:
