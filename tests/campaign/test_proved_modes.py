@@ -34,20 +34,22 @@ def test_each_claim_is_about_the_flights_that_end_in_its_mode():
     """As recordings of their flights show."""
     found = flown(mission())
     claims = {one.about.partition(": ")[2]: one for one in found.laws[0].claims}
-    modes, worst = [], 0.0
+    modes, worst = [], list[float]()
     for run in range(24):
         scenario = found.again(run).scenario.with_({"simulation.record_every": 1})
         seen = record(scenario, build(scenario, scenario.laws[0]))
         modes.append(int(seen["mode"][-1]))
         if modes[-1] == 1:
-            worst = max(worst, error_angle(seen["attitude_error"])[seen["time"] >= 45.0].max())
+            worst.append(error_angle(seen["attitude_error"])[seen["time"] >= 45.0].max())
     assert 4 < modes.count(1) < 20
     for place, name in enumerate(("first", "second"), 1):
         assert claims[name].left[proved.ELSEWHERE] == 24 - modes.count(place)
         assert 0 < claims[name].covered <= modes.count(place)
     angle = claims["first"].within[0]
     assert angle.metric == "final_attitude_error"
-    assert 0.0 < angle.flown == pytest.approx(worst, rel=1e-3)
+    # Not all flights are in the set of the claim from then on.
+    assert 0.0 < angle.flown <= max(worst) * (1.0 + 1e-3)
+    assert min(abs(angle.flown - x) for x in worst) < 1e-3 * angle.flown
     assert angle.beyond == 0
     assert not found.contradicted
 
