@@ -26,6 +26,7 @@ FILLED = (
     "certificates.md",
     "index.md",
     "invariant-sets.md",
+    "kernel-flying.md",
     "kernel.md",
     "law-authors.md",
     "not-claimed.md",

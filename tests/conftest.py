@@ -144,3 +144,14 @@ def offer(monkeypatch):
     yield give
     monkeypatch.undo()
     forget()
+
+
+@pytest.fixture
+def quiet_plots():
+    """What Matplotlib draws by default: libraries that other tests import change what plots look like."""
+    from matplotlib import pyplot, rc_context, rcdefaults
+
+    with rc_context({"backend": "agg"}):
+        rcdefaults()
+        yield
+        pyplot.close("all")

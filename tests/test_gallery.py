@@ -4,7 +4,6 @@ import runpy
 import sys
 from pathlib import Path
 
-import matplotlib as mpl
 import pytest
 from matplotlib.testing.compare import compare_images
 
@@ -16,15 +15,6 @@ PARTS = {"leak", "rate_damping"}
 """Files that scripts name, and that are none themselves."""
 TOLERANCE = 12.0
 """Root mean square of the difference, of 255: other fonts differ by less, another curve by more."""
-
-
-@pytest.fixture
-def quiet_plots():
-    with mpl.rc_context({"backend": "agg"}):
-        # Libraries that other tests import change what plots look like.
-        mpl.rcdefaults()
-        yield
-        mpl.pyplot.close("all")
 
 
 @pytest.mark.parametrize("name", leading(SCRIPTS))

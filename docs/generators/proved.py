@@ -32,8 +32,9 @@ SCENARIOS = ("three-laws", "geostationary", "wheels-orbital", "flexible-slew", "
 REST = "all of these"
 LONGER, MOST = 2, 1e6
 """A flight lasts at least so many times the time after which the bound holds."""
-LANES, FEWER, LASTING, ROUNDS, DIRECTIONS = 2500, 250, 1000, 4, 24
-"""Flights of a round, and of one of flights with more samples than the third number; rounds; directions of each start."""
+LANES, FEWER, LASTING, SWAYING, ROUNDS, DIRECTIONS = 2500, 250, 1000, 32, 4, 24
+"""Flights of a round, of one of flights with more samples than the third number, and of one with appendages; rounds;
+directions of each start."""
 MISSING = "—"
 
 
@@ -75,7 +76,7 @@ def worst(claim: Claim) -> dict[str, Any]:
     proof: Any = claim.proof
     content = {"programs": dict(proof.programs), "claims": [proof.claim]}
     if claim.kind == "appendages":
-        return {"flown": Swaying(content, 1, 64).against()["angle"], "flights": 64}
+        return {"flown": float(Swaying(content, 1, SWAYING).worst(ROUNDS)), "flights": SWAYING * ROUNDS}
     # Flights that last long are fewer.
     samples = Steered(content, proof.claim, 1, 16).search(1)[0].samples
     lanes = LANES if samples < LASTING else FEWER

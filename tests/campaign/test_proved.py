@@ -118,6 +118,14 @@ def test_what_differs_from_the_claims_loop_is_not_covered():
     assert weak.laws[0].claims[0].covered == less
 
 
+@pytest.mark.slow
+def test_a_part_whose_numbers_have_no_bound_any_more_makes_another_loop():
+    """The errors of a gyro are bounded without an error of its scale factor, and the claim is about those."""
+    gyro = {"type": "gyro", "bias": [1e-5, 0.0, 0.0]}
+    found = flown({"part.gyro.scale_error": uniform(-0.2, 0.2)}, scenario=steady(sensor={}, part=[gyro]), runs=3)
+    assert found.laws[0].claims[0].left == {proved.OTHER: 3}
+
+
 def test_it_is_said_why_nothing_is_proved():
     faulty = steady(fault=[{"time": 40.0, "inertia": [2.1, 3.0, 4.0], "action": "none"}])
     assert "what changes at 40 s" in flown(runs=2, scenario=faulty).laws[0].claims[0].text

@@ -50,8 +50,15 @@ class Attack(Oracle):
             self.noise(self.lanes, self.rng) if "share" in n else None,
             (n.get("told.change", np.inf), n.get("told.change.per.rate", 0.0)),
             (n.get("noise.torque.deviation", 0.0), n.get("noise.torque", 0.0)),
+            self.moving(),
         )  # fmt: skip
         return found
+
+    def moving(self):
+        """How errors of what the law is told grow with the motion, if they do."""
+        n = self.numbers
+        rows = [[n.get(f"error.{told}.per.{of}", 0.0) for of in ("rate", "acceleration")] for told in ("attitude", "rate")]
+        return (rows, max(1, int(n.get("error.ago", 0.0) / n["period"])), n["period"]) if np.any(rows) else None
 
     def step(self):
         """What the state (w, q) and a torque held for a period are of the state after it, near rest."""

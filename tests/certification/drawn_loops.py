@@ -58,7 +58,7 @@ def random_loop(random, kind=""):
             lines += [f"delay = {2 * period!r}", 'action = "reallocate"']
     law = some("lyapunov", "wheel", "wheel") if wheels else some("lyapunov", "lyapunov", "pd", "matrix-pd", "lqr", "wheel")
     law = "mpc" if "plans" in kinds else "pid" if "integral" in kinds else law
-    lines += [*parts_of(random, some, size, numbers, orbit, wheels, k, w, period)]
+    lines += [*parts_of(random, some, size, numbers, orbit, wheels, k, w, period, "delayed" in kinds)]
     if "late" in kinds:
         lag, limit = size(0.05, 3.0) * period, size(0.3, 30.0) * k * w
         lines[2:2] = [some(f"actuator_lag = {lag:.6g}", f"torque_rate_limit = {limit:.6g}")]
@@ -131,7 +131,7 @@ def target_of(random, some, size, numbers, orbit, w):
     return given
 
 
-def parts_of(random, some, size, numbers, orbit, wheels, k, w, period):
+def parts_of(random, some, size, numbers, orbit, wheels, k, w, period, delayed=False):
     """Lines of parts that disturb and measure, each as large as it may be for its bound to be of use."""
 
     def vector(length):
@@ -154,7 +154,19 @@ def parts_of(random, some, size, numbers, orbit, wheels, k, w, period):
             yield from part("solar-pressure", plates=f"[{numbers([*plate, 0.3, 0.4])}]")
         if chance[4]:
             yield from part("oblateness")
-    if chance[5]:
+    if delayed and some(0, 1):
+        # Late readings without a filter, or with one.
+        built = {"delay": size(0.01, 0.1) / w, "scale_error": some(0.0, 1e-3), "mounting_error": vector(size(1e-5, 1e-2))}
+        yield from part("gyro", bias=vector(size(1e-5, 1e-2) * w), **built | {"delay": some(0.0, size(0.003, 0.03) / w)})
+        late = {"delay": min(built["delay"], 60.0 * period), "interval": period * some(1, 1, 3)}
+        yield from part("star-tracker", cross=some(0.0, 1e-5), roll=1e-5, **late)
+    elif delayed:
+        yield from part("gyro", bias=vector(1e-3 * w), noise=size(1e-6, 1e-4) * w, scale_error=some(0.0, 1e-3))
+        late = {"delay": min(some(0.0, size(0.01, 0.1)) / w, 60.0 * period), "interval": period * some(1, 2, 4)}
+        yield from part("star-tracker", cross=size(1e-6, 1e-4), roll=size(1e-6, 1e-4), **late)
+        gain = size(0.2, 0.9)
+        yield from part("complementary-filter", attitude_gain=gain, bias_gain=size(5e-3, 0.1) * gain**2 / late["interval"])
+    elif chance[5]:
         # Readings without a filter.
         yield from part("gyro", bias=vector(size(1e-5, 1e-2) * w), noise=some(0.0, size(1e-6, 1e-4) * w * math.sqrt(period)))
         yield from part("star-tracker", cross=some(0.0, 1e-5), roll=some(0.0, 1e-5), mounting_error=vector(size(1e-5, 1e-2)))

@@ -72,7 +72,7 @@ class Steered(Attack):
         acts, if it is late."""
         zero, h = np.zeros(w.shape), self.numbers["period"]
         bounds = around.bounds
-        around.bounds, kept = bounds._replace(turned=1.0, rated=1.0, change=(np.inf, 0.0)), around.kept
+        around.bounds, kept = bounds._replace(turned=1.0, rated=1.0, change=(np.inf, 0.0), moving=None), around.kept
         around.load, around.told = zero, 0.0 * around.told
         command = around.command(self.fleet_of.law, q, w, 0.0, zero, (attitude + zero, rate + zero))
         fleet, acting, late = self.fleet_of, [command] * 2, self.fleet_of.late

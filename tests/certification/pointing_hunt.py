@@ -1,7 +1,8 @@
 """Random loops of which a pointing bound is proved, and flights that are steered against it: `python -m
 tests.certification.pointing_hunt SEED COUNT [TOLERANCE | KIND]` prints what came of each; KIND: "plans" for loops with
 the predictive law, "targets" for ones that move, "shaken" for random torques, "integral" for a law with an integral,
-"lost" for a wheel that is lost, "late" for an actuator that lags, "every" for all of these, each now and then."""
+"lost" for a wheel that is lost, "late" for an actuator that lags, "every" for all of these, each now and then; and
+"delayed" for sensors that are late and the complementary filter."""
 
 import math
 import sys

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from starhold.certification.certificate import Certificate, Claim, Obligation
+from starhold.certification.hand_over import flown_ends
 from starhold.certification.subject import make_subject
 from starhold.parts.craft import tensor
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.studies.bodies.rigid_body import STUDY
-from starhold.studies.chain import chains, links_of, sentence, summary
+from starhold.studies.chain import _unending, chains, links_of, sentence, summary
 from starhold.studies.modes import fresh_momentum, hand_overs
 from tests.certification.attack import Attack
 from tests.certification.handed import POINT, bounded
@@ -113,6 +114,24 @@ def mission_loop():
 
 def mission_links(*certificates):
     return links_of(mission_loop(), "mission", {one.name: one for one in certificates})
+
+
+def test_a_rate_is_told_with_the_errors_of_where_the_target_turns():
+    """A switch that looks at the rate to a target that turns may be taken at a larger one, as the attitude is off."""
+    (switch,) = (one for one in hand_overs(mission_loop(), "") if one.places == (2, 3))
+    (claim,) = stated("unload", 3.2).claims
+    claim = replace(claim, numbers=claim.numbers | {"attitude_error": 0.1})
+    rate, _ = flown_ends({"rate_below": 1e-3}, switch.before, switch.after, None, claim)
+    start = switch.before.start
+    orbital = float(np.linalg.norm(np.cross(start.position, start.velocity)) / np.dot(start.position, start.position))
+    # The attitude is off about an axis across that of the target, and the rate just as its measurement is.
+    off = 2.0 * math.sin(0.05) * orbital
+    assert rate > 1e-3 + 2e-4 + off > 1e-3 + 2e-4 + 1e-4
+    # Nor does a mode surely end which is settled to just that.
+    settled = replace(claim, numbers=claim.numbers | {"angle": 1e-4, "rate": 1e-3 - 2e-4 - 0.5 * off})
+    last = switch._replace(levels={"rate_below": 1e-3})
+    assert _unending(last, "nadir", settled) == ["nadir ends"]
+    assert _unending(last, "nadir", replace(settled, numbers=settled.numbers | {"rate": 1e-3 - 2e-4 - 1.1 * off})) == []
 
 
 def test_a_mode_that_begins_with_more_momentum_is_entered_by_its_wider_claim():

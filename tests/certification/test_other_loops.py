@@ -6,7 +6,7 @@ import starhold as sh
 from starhold.certification.certificate import write
 from starhold.scenario.building import build
 from starhold.studies.body import study_of
-from starhold.studies.certificates import compare_programs
+from starhold.studies.certificates import compare_programs, left_open
 
 WHEELS = {"layout": "pyramid", "inertia": 1e-3, "torque_limit": "20 mN m", "momentum_limit": "0.4 N m s"}
 CRAFT = {
@@ -61,3 +61,40 @@ def test_claims_about_wheels_on_other_axes_say_why_there_are_none():
     (certificate,) = sh.certify(sh.scenario(CRAFT | {"wheels": WHEELS | {"mounting_error": ["5 deg", 0.0, 0.0]}}))
     assert certificate.claims == ()
     assert certificate.subject["no_pointing"] == "the allocation takes wheels to be mounted otherwise than they are"
+
+
+ORBIT = {"orbit": {"altitude": "400 km", "inclination": "50 deg"}}
+PANEL = {"type": "flexible-modes", "modes": [[2.0, 0.005, 0.1, 0.0, 0.1, 0.0]]}
+EVERY, SET = "pd: convergence, torque-limit, inertia, sampling: ", "; the flight starts outside of its set"
+TURNS = "the target turns"
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({}, []),
+        ({"sensor": {"attitude_noise": "10 arcsec"}}, [f"{EVERY}without the sensor gaussian"]),
+        ({"spacecraft": CRAFT["spacecraft"] | {"actuator_lag": 0.3}}, [f"{EVERY}without the actuator lag"]),
+        ({"part": [PANEL]}, [f"{EVERY}without the effector flexible-modes"]),
+        (ORBIT | {"part": [{"type": "oblateness"}]}, [f"{EVERY}without the environment oblateness"]),
+        (ORBIT | {"environment": {"gravity_gradient": True}}, [f"{EVERY}the gravity gradient acts"]),
+        (
+            ORBIT | {"target": {"mode": "orbital"}},
+            [f"pd: convergence, inertia, sampling: {TURNS}", f"pd: torque-limit: {TURNS}{SET}"],
+        ),
+    ],
+)
+def test_a_check_says_what_proofs_leave_out_of_a_scenario(more, said, proved):
+    """Programs and numbers are those of the proofs, and the scenario has parts and motions that these are not about."""
+    scenario = sh.scenario(CRAFT | more)
+    assert compare_programs(proved / "bare", scenario) == []
+    assert left_open(proved / "bare", scenario) == said
+
+
+def test_a_check_says_where_wheels_have_what_proofs_leave_out(proved):
+    friction = sh.scenario(CRAFT | {"wheels": WHEELS | {"coulomb": 1e-4}})
+    assert compare_programs(proved / "wheels", friction) == []
+    assert left_open(proved / "wheels", friction) == [
+        "pd: convergence, inertia: the wheels have friction",
+        f"pd: wheels: the wheels have friction{SET}",
+    ]

@@ -14,6 +14,7 @@ from starhold.certification.evidence.finding import certificate
 from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes
+from starhold.errors import InputError
 from starhold.kernel.check import check
 from starhold.scenario.building import build
 from starhold.simulation.lane import fly, label
@@ -47,6 +48,84 @@ def lyapunov(measurement, gains, craft):
 
 def examples():
     return [Gains(0.5, 0.05)]
+"""
+BALLAST = """
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.vector import ZERO, add, cross, scale
+from starhold.parts.contract import Card, Parameter, Push
+
+CARD = Card(title="Ballast", summary="more inertia, or momentum", sources=("a textbook",), assumptions=("none",))
+ROLE, ACTS = "effector", {acts}
+
+
+class Params(NamedTuple):
+    inertia: Annotated[float, Parameter("kg m^2", text="that it adds")] = 0.0
+    momentum: Annotated[float, Parameter("N m s", text="that it has")] = 0.0
+
+
+def command(applied, params):
+    return applied
+
+
+def reaction(state, command, body, params):
+    held = scale(-1.0, cross(body.rate, momentum(state, params)))
+    return add(command, held) if ACTS else held
+
+
+def rates(state, command, body, acceleration, params):
+    return None
+
+
+def momentum(state, params):
+    return (params.momentum, 0.0, 0.0)
+
+
+def applied(state, command, body, params):
+    return command
+
+
+def bound(params, envelope):
+    return Push(1e-9, abs(params.momentum))
+
+
+def error(params, envelope):
+    return Push(0.0)
+
+
+def examples():
+    return [Params()]
+"""
+ADDED = """
+
+def inertia(state, params):
+    return ((params.inertia, 0.0, 0.0), (0.0, params.inertia, 0.0), (0.0, 0.0, params.inertia))
+"""
+PLACE = """
+from typing import Annotated, NamedTuple
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.vector import Vector, scale
+from starhold.parts.contract import NO_ERRORS, Card, NoParams
+
+CARD = Card(title="Place", summary="a place", sources=("a textbook",), assumptions=("none",))
+ROLE, Params = "sensor", NoParams
+
+
+class Reading(NamedTuple):
+    position: Annotated[Vector, Quantity("m", "position as it is told", "axis")]
+
+
+def measure(state, memory, params, dice, step):
+    return Reading(scale(0.4, state.position)), memory
+
+
+def error(params):
+    return NO_ERRORS
+
+
+def examples():
+    return [Params()]
 """
 ALL, ONE, NONE = "scale(3000.0, e)", "(0.0, 3000.0 * e[1], 0.0)", "(0.0, 0.0, 0.0)"
 WELL, EVEN = "2.0 * gains.k * (1.0 - measurement.attitude[0])", "gains.k * dot(q, q)"
@@ -137,3 +216,53 @@ def test_the_other_quaternion_is_outside_the_set_of_an_odd_law_with_an_even_v(tm
             # It comes from there, and is covered once it is in the set.
             assert angles[round(begin / loop.period) :].max() < claim.numbers["funnel"][0][1]
             assert run.arrays["attitude_error"][round(begin / loop.period), 0] > 0.0
+
+
+def test_a_law_is_not_even_because_its_card_says_so(tmp_path, monkeypatch):
+    """Its claim would hold at the other quaternion too, from which it turns the body by a full turn."""
+    monkeypatch.setitem(globals(), "LAW", LAW.replace('claims="none"', 'claims="none", quaternion_sign="even"'))
+    with pytest.raises(InputError, match="its torque at q differs from that at -q, but its card says: even"):
+        loop_of(tmp_path, NONE, EVEN)
+    # One that is.
+    by = "scale(measurement.attitude[0], vector_part(measurement.attitude))"
+    monkeypatch.setitem(globals(), "LAW", LAW.replace("vector_part(measurement.attitude))", f"{by})", 1))
+    assert loop_of(tmp_path, NONE, EVEN).law.card.quaternion_sign == "even"
+
+
+@pytest.mark.parametrize(
+    ("added", "told", "numbers", "there"),
+    [
+        (ADDED, NONE, {"inertia": 60.0}, False),
+        ("", "scale(0.5, measurement.wheel_momentum)", {"momentum": 0.01}, False),
+        # A law that does not read it, and momentum that is none.
+        ("", NONE, {"momentum": 1e-4}, True),
+        ("", "scale(0.5, measurement.wheel_momentum)", {}, True),
+    ],
+)
+def test_no_bound_of_a_torque_is_one_of_inertia_or_of_momentum_that_a_law_reads(added, told, numbers, there, tmp_path):
+    """The largest torque of an effector says neither; a flight that was covered by the claim broke it by far."""
+    (tmp_path / "ballast.py").write_text(BALLAST.replace("{acts}", str(not added)) + added)
+    part = {"file": str(tmp_path / "ballast.py")} | numbers
+    attitude = [float(np.cos(0.05)), 0.0, float(np.sin(0.05)), 0.0]
+    here = {"target": {"mode": "inertial", "attitude": [1, 0, 0, 0]}}
+    loop = loop_of(tmp_path, told, attitude=attitude, part=[part], **here)
+    issued = certify(loop, "", Wanted(pointing=True, alone=True))
+    claim = issued.claim("pointing")
+    assert claim.outcome == "proved"
+    run, angles = flown(loop, 6000)
+    (time, most), *_ = ((x, y) for x, y in claim.numbers["funnel"] if x > 300.0)
+    kept = angles[round(time / loop.period) :].max() <= most
+    assert (claim.left_out, kept) == (([], True) if there else (["effector ballast"], False))
+    assert (covered(issued, loop, run) is not None) is there
+
+
+def test_errors_of_an_attitude_are_none_of_a_place_at_which_a_torque_is_told(tmp_path):
+    """A sensor that says how wrongly it tells attitude and rate at most, which is not at all, tells a place far too low."""
+    (tmp_path / "place.py").write_text(PLACE)
+    loop = loop_of(tmp_path, "scale(-1.0, e)", part=[{"file": str(tmp_path / "place.py")}], **PULLED)
+    issued = certify(loop, "", Wanted(pointing=True, alone=True))
+    claim = issued.claim("pointing")
+    assert (claim.outcome, claim.left_out) == ("proved", ["sensor place"])
+    assert covered(issued, *(loop, flown(loop, 3)[0])) is None
+    _, angles = flown(loop, 12000)
+    assert angles[11000:].max() > 1.2 * claim.numbers["angle"]

@@ -50,8 +50,9 @@ def moved(J, inverse, q, w, torque, h):
 class Surroundings(NamedTuple):
     """Bounds of a torque that the law is told (about each axis), of a target's rate and acceleration, of the momentum with
     wheels (None: there are none), of errors of the attitude and the rate that it is told, and of how fast the torque changes
-    that it is told, with what is more for each rad that the body turns; and the deviation of a random torque and the most
-    that it is."""
+    that it is told, with what is more for each rad that the body turns; the deviation of a random torque and the most that
+    it is; and how much more attitude and rate are off for each unit of the body's rate and acceleration in so many of the
+    last samples (rows, samples, period)."""
 
     told: list
     rate: float
@@ -62,6 +63,7 @@ class Surroundings(NamedTuple):
     noise: "Noise | None" = None
     change: tuple = (np.inf, 0.0)
     shaken: tuple = (0.0, 0.0)
+    moving: tuple | None = None
 
 
 class Noise:
@@ -99,7 +101,7 @@ class Around:
         self.swing = bounds.acceleration / max(bounds.rate, 1e-300)
         self.told = np.array(bounds.told)[:, None]
         self.kept = 0.7 * (bounds.momentum or 0.0) * along(rng.normal(size=(3, lanes)))
-        self.load, self.sudden = None, not np.isfinite(bounds.change[0])
+        self.load, self.sudden, self.past = None, not np.isfinite(bounds.change[0]), []
 
     def target(self, q, t):
         if not self.bounds.rate and not self.bounds.acceleration:
@@ -108,10 +110,24 @@ class Around:
         rate, slope = self.bounds.rate * np.cos(angle), -self.bounds.acceleration * np.sin(angle)
         return seen(q, rate * self.axis), seen(q, slope * self.axis)
 
+    def misled(self, q, w, t):
+        """How far attitude and rate are off that the law is told: as much as they may be after the last samples."""
+        turned, rated = self.bounds.turned, self.bounds.rated
+        if self.bounds.moving is None:
+            return turned, rated
+        rows, count, h = self.bounds.moving
+        inertial = w + self.target(q, t)[0]
+        before = self.past[-1][0] if self.past else inertial
+        self.past = [*self.past, (inertial, np.linalg.norm(inertial - before, axis=0) / h)][-count - 1 :]
+        fast = np.max([np.linalg.norm(one, axis=0) for one, _ in self.past], axis=0)
+        more = np.array(rows) @ np.stack([fast, np.max([one for _, one in self.past[-count:]], axis=0)])
+        return turned + more[0], rated + more[1]
+
     def command(self, law, q, w, t, unit, misread=None):
         """What the law asks for, with what it is told; misread: the ways in which attitude and rate are off."""
         off, fast = misread or (unit, -unit)
-        wrong, fast = turned_on(q, self.bounds.turned * off), self.bounds.rated * fast
+        turned, rated = self.misled(q, w, t)
+        wrong, fast = turned_on(q, turned * off), rated * fast
         if self.bounds.noise:
             angles, rated = self.bounds.noise.told()
             wrong, fast = turned_on(wrong, angles), fast + rated

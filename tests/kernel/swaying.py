@@ -188,13 +188,7 @@ class Swaying:
                 for _ in range(SUBSTEPS):
                     torque = held + self.pushed(x, "outside", weight)
                     note("torques", np.abs(torque) / torques)
-                    s = self.h / SUBSTEPS
-                    a = self.rates(x, torque)
-                    b = self.rates(x + s / 2 * a, torque)
-                    c = self.rates(x + s / 2 * b, torque)
-                    d = self.rates(x + s * c, torque)
-                    x = x + s / 6 * (a + 2 * b + 2 * c + d)
-                    x[:4] /= np.linalg.norm(x[:4], axis=0)
+                    x = self.later(x, torque, self.h / SUBSTEPS)
                     note("sizes", np.abs(np.vstack([x[4:7], x[1:4], x[7:]])) / sizes)
                     if n * self.h > self.numbers["settling"]:
                         note("angle", 2 * np.arcsin(np.linalg.norm(x[1:4], axis=0)) / self.numbers["end.angle"])
@@ -206,6 +200,8 @@ class Swaying:
         """Whether no flight is against what the claim says of V, torques and the end, nor the set without what it holds."""
         reached = self.against(min(seconds, 1.2 * self.numbers["settling"] + 20.0 * self.h))
         said = max(reached.get(name, 0.0) for name in ("V", "limit", "limit.norm", "angle", "rate"))
+        ends = np.hstack([np.eye(3), self.rng.normal(size=(3, 8))])
+        said = max(said, *(np.max(self.steered(ends, part=part)) for part in (slice(3, 6), slice(3))))
         return said <= 1.0 + 1e-6 and self.contains()
 
     def contains(self):
@@ -224,10 +220,86 @@ class Swaying:
         if not off and not rate:
             return q, w
         a, b = (self.rng.normal(size=w.shape) for _ in range(2))
-        a, b = a / np.linalg.norm(a, axis=0), b / np.linalg.norm(b, axis=0)
-        c, s = np.cos(off / 2), np.sin(off / 2) * a
-        turned = np.vstack([q[0] * c - (q[1:] * s).sum(0), q[0] * s + c * q[1:] + np.cross(q[1:].T, s.T).T])
-        return turned, w + rate * b
+        return misled(q, w, off * along(a), rate * along(b))
+
+    def later(self, x, torque, s):
+        """States after so many seconds."""
+        a = self.rates(x, torque)
+        b = self.rates(x + s / 2 * a, torque)
+        c = self.rates(x + s / 2 * b, torque)
+        x = x + s / 6 * (a + 2 * b + 2 * c + self.rates(x + s * c, torque))
+        x[:4] /= np.linalg.norm(x[:4], axis=0)
+        return x
+
+    def after(self, x, outside, error, turned, rate):
+        """States after a period in which torques from outside are those of `outside`, one after the other."""
+        u = self.command(*misled(x[:4], x[4:7], turned, rate)) + error
+        for push in outside:
+            x = self.later(x, u + push, self.h / len(outside))
+        return x
+
+    def responses(self, parts):
+        """What a period does near rest, by differences of flown ones: to (w, q, v), and what pushes from outside in each of
+        its parts, errors of the command, and errors of the attitude and of the rate that the law is told make of it."""
+        e, n, none = 1e-6, self.n, np.zeros((3, self.n))
+
+        def slope(z, vectors):
+            sides = []
+            for s in (-e, e):
+                given = [s * v for v in vectors]
+                x = self.after(self.state(s * z[:, :6], s * z[:, 6:]), given[:parts], *given[parts:])
+                sides.append(np.vstack([x[4:7], x[1:4], x[7:]]))
+            return (sides[1] - sides[0]) / (2 * e)
+
+        count, made = parts + 3, []
+        for k in range(count):
+            vectors = [np.eye(3, n) if i == k else none for i in range(count)]
+            made.append(slope(np.zeros((n, n)), vectors)[:, :3])
+        return slope(np.eye(n), [none] * count), made
+
+    def steered(self, ends, parts=1, left=1e-3, part=slice(3, 6)):
+        """Fly from rest a lane for each direction of the angle or the rate at the last sample, (3, lanes): what is bounded
+        turns over as the response does. The shares of the claimed angle and rate that each comes to."""
+        A, made = self.responses(parts)
+        ways = [np.zeros((self.n, ends.shape[1]))]
+        ways[0][part] = along(ends)
+        while (np.abs(ways[-1][:6]).max() > left or len(ways) < 50) and len(ways) < 20000:
+            ways.append(A.T @ ways[-1])
+        x = self.resting(ends.shape[1])
+        sizes = [*["outside"] * parts, "error", "error.attitude", "error.rate"]
+        for way in reversed(ways):
+            fast = np.linalg.norm(x[4:7], axis=0)
+            most = [self.numbers.get(one, 0.0) + self.numbers.get(f"{one}.per.rate", 0.0) * fast for one in sizes]
+            chosen = [size * along(B.T @ way) for size, B in zip(most, made, strict=True)]
+            x = self.after(x, chosen[:parts], *chosen[parts:])
+        turned = 2 * np.arcsin(np.linalg.norm(x[1:4], axis=0))
+        return turned / self.numbers["end.angle"], np.linalg.norm(x[4:7], axis=0) / self.numbers["end.rate"]
+
+    def resting(self, lanes):
+        """States on target."""
+        return self.state(np.zeros((lanes, 6)), np.zeros((lanes, self.count)))
+
+    def worst(self, rounds=3):
+        """The largest angle of steered flights, in directions at random and then about the worst of them, as a share."""
+        ends, found = along(self.rng.normal(size=(3, self.lanes))), 0.0
+        for k in range(rounds):
+            shares, _ = self.steered(ends)
+            found, best = max(found, shares.max()), ends[:, np.argsort(-shares)[: max(self.lanes // 8, 1)]]
+            spread = 0.3 / 4.0**k * self.rng.normal(size=ends.shape)
+            ends = along(best[:, self.rng.integers(best.shape[1], size=self.lanes)] + spread)
+        return found
+
+
+def along(v):
+    """Vectors of no length, or of the length 1."""
+    return v / np.linalg.norm(v, axis=0).clip(1e-300)
+
+
+def misled(q, w, turn, rate):
+    """What a law is told that is off by a rotation and by a rate."""
+    off = np.linalg.norm(turn, axis=0)
+    c, s = np.cos(off / 2), np.sin(off / 2) * along(turn)
+    return np.vstack([q[0] * c - (q[1:] * s).sum(0), q[0] * s + c * q[1:] + np.cross(q[1:].T, s.T).T]), w + rate
 
 
 def programs_of(content, claim):

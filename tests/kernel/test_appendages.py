@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from starhold.analysis.departure import departures, start_inside
 from starhold.certification.appendages import appended_motion
@@ -18,12 +19,16 @@ from starhold.certification.evidence.attitude import Loop
 from starhold.certification.subject import make_subject
 from starhold.kernel import appended
 from starhold.kernel.check import check
-from starhold.kernel.numbers import Account, RefusedError
+from starhold.kernel.numbers import Account, RefusedError, rational
 from starhold.kernel.programs import Program, digest
 from starhold.kernel.taylor import ONE, run, within
+from starhold.kernel.theorems.response import Response
 from starhold.simulation.lane import fly, label
+from tests.kernel.certificates import failing
+from tests.kernel.oracle import number
 from tests.kernel.programs import run as run_in_floats
 from tests.kernel.swaying import MODES, MOMENTS, Swaying, content_of, found, loop_of
+from tests.tiers import leading
 
 MOST = 1.0 + 1e-6
 
@@ -131,7 +136,7 @@ def appended_start(loop, state):
 
 STRONGER = {
     "level": 1.01, "angle": 1.01, "begun.0": 1.02, "begun.3": 1.05, "outside": 30.0, "highest": 0.99, "settling": 0.9,
-    "end.angle": 0.95, "end.rate": 0.95, "limit": 0.2, "period": 2.0,
+    "end.angle": 0.99, "end.rate": 0.99, "limit": 0.2, "period": 2.0,
 }  # fmt: skip
 
 
@@ -222,6 +227,95 @@ def without_tube(monkeypatch):
         "period",
         lambda self, box: kept(self, box)._replace(between=self.start, far=none([self.misread])[0]),
     )
+
+
+@pytest.mark.parametrize(("name", "near"), leading([("bent", 0.95), ("biased", 0.95), ("panels", 0.93)]))
+def test_steered_flights_come_near_to_what_is_proved_and_no_further(name, near):
+    against = Swaying(content_of(name), 1, 16)
+    ends = np.hstack([np.eye(3), against.rng.normal(size=(3, 3))])
+    angles, _ = against.steered(ends)
+    _, rates = against.steered(ends, part=slice(3))
+    assert near < angles.max() <= 1.0
+    assert 0.7 < rates.max() <= 1.0
+
+
+@pytest.mark.parametrize("name", leading(["bent", "panels"]))
+def test_gains_are_the_sums_of_the_impulse_response(name):
+    """Sums of what SciPy makes of pushes in the tenths of a period, by the kernel's A, B and K."""
+    motion = appendages.Swinging(Loop(make_subject(loop_of(name)))).motion
+    A, B, K = (np.array(rows, dtype=float) for rows in (motion.A, motion.B, motion.K))
+    n, h, parts = motion.n, float(motion.h), 10
+    fine, held = (expm(np.block([[A, B], [np.zeros((3, n + 3))]]) * h / k) for k in (parts, 1))
+    moved = held[:n, :n] - held[:n, n:] @ K
+    assert np.allclose(np.array(motion.sampled, dtype=float), moved, rtol=1e-9, atol=1e-12)
+    told = content_of(name)["claims"][0]["evidence"]["response"]
+    rows, free, error = np.vstack([np.eye(n)[:6], (A - B @ K)[:3]]), np.zeros(9), np.zeros(9)
+    for _ in told["weights"][0]:
+        error += np.linalg.norm(rows @ held[:n, n:], axis=1)
+        later = rows
+        for _ in range(parts):
+            free += np.linalg.norm(later @ fine[:n, n:], axis=1)
+            later = later @ fine[:n, :n]
+        rows = rows @ moved
+    for k, (chord, bent, late) in enumerate(told["gains"]):
+        part = slice(3 * k, 3 * k + 3)
+        # In a direction between the axes rates and acceleration may be larger.
+        wide = 1.04 if k == 1 else 1.4
+        assert free[part].max() <= number(chord) + number(bent) < wide * free[part].max()
+        assert error[part].max() <= number(late) < wide * error[part].max()
+
+
+@pytest.mark.parametrize("part", ["rate", "turn", "acceleration"])
+def test_a_gain_that_is_too_small_is_refused(part):
+    content = copy.deepcopy(content_of("bent"))
+    (claim,) = content["claims"]
+    gains = claim["evidence"]["response"]["gains"]
+    place = ["rate", "turn", "acceleration"].index(part)
+    gains[place] = [str(rational(x) * Fraction(95, 100)) for x in gains[place]]
+    assert failing(claim, content["programs"]) == {f"response of the {part}"}
+
+
+def without_left(monkeypatch):
+    begin = Response.__init__
+    monkeypatch.setattr(
+        Response, "__init__", lambda self, count, gains, left, beside: begin(self, count, gains, none(left), beside)
+    )
+
+
+def test_what_is_left_of_the_motion_before_a_response_counts(monkeypatch):
+    """Else a response of few samples would end the motion where it does not end."""
+    monkeypatch.setattr(appendages, "LEFT", 0.7)
+    content = copy.deepcopy(content_of("bent"))
+    (claim,), swinging = content["claims"], appendages.Swinging(Loop(make_subject(loop_of("bent"))))
+    told, _ = swinging.response
+    assert len(told["weights"][0]) < 100
+    claim["evidence"]["response"] = told
+    claim["numbers"]["end.angle"] = str(Fraction(claim["numbers"]["end.angle"]) * Fraction(7, 10))
+    assert failing(claim, content["programs"]) == {"end of the angle", "end of the rate"}
+    without_left(monkeypatch)
+    assert "end of the angle" not in failing(claim, content["programs"])
+    assert Swaying(content, 1, 3).steered(np.eye(3))[0].max() > 1.2
+
+
+def test_what_is_not_linear_counts_in_a_response():
+    """Of one period from far off, with the true sizes of z, what is beside the linear motion is as large as it is said."""
+    swinging, against = appendages.Swinging(Loop(make_subject(loop_of("bent")))), Swaying(content_of("bent"), 1, 200)
+    motion, random = swinging.motion, np.random.default_rng(2)
+    z = random.uniform(-0.05, 0.05, size=(200, motion.n))
+    z[:, 6:] /= 10.0
+    x = against.state(z[:, :6], z[:, 6:])
+    reached = swinging.reached([Fraction(float(r.max())) for r in against.modes(x)], None)
+    box = appended.Box(*[[2 * size + Fraction(1, 50) for size in part] for part in reached], [Fraction(1, 4)] * motion.n)
+    period = motion.period(box)
+    rest, less = (
+        np.array(motion.beside(one, box, Fraction(0)), dtype=float)[:, None] + 1e-9
+        for one in (period, period._replace(over=none([period.over])[0]))
+    )
+    none_of = np.zeros((3, 200))
+    later = against.after(x, [none_of] * 4, none_of, none_of, none_of)
+    far = np.vstack([later[4:7], later[1:4], later[7:]]) - np.array(motion.sampled, dtype=float) @ z.T
+    assert (np.abs(far) <= rest).all()
+    assert (np.abs(far) > 10.0 * less)[:6].any(axis=1).all()
 
 
 EACH = ("outside", "error", "error.attitude", "error.rate")

@@ -30,18 +30,37 @@ def lower(content, claim):
     claim["numbers"]["highest"] = str(rational(claim["numbers"]["level"]) / 2)
 
 
+def boxed(content, claim):
+    """Motions end in the last box, which is larger than what the response says."""
+    claim["evidence"].pop("response")
+    scaled(("end.angle", "8"), ("end.rate", "8"))(content, claim)
+
+
 def at_once(content, claim):
     """The motion is where it ends after a period of each round."""
     for one in claim["evidence"]["rounds"][:-1]:
         one["periods"] = 1
     claim["numbers"]["settling"] = str(rational(claim["numbers"]["period"]) * len(claim["evidence"]["rounds"]))
+    boxed(content, claim)
 
 
 def nearer(content, claim):
-    """The last box, and what is claimed of the end, are a hundred times smaller, and so is all at samples."""
+    """The last box is a hundred times smaller, and what is claimed of the end is that."""
     last = claim["evidence"]["rounds"][-1]
     last["sizes"] = [str(Fraction(x) / 100) for x in last["sizes"]]
+    boxed(content, claim)
     scaled(("end.angle", "1/100"), ("end.rate", "1/100"))(content, claim)
+
+
+def small_response(part, end, gain, share):
+    """The loop is said to move less under pushes."""
+
+    def change(content, claim):
+        gains = claim["evidence"]["response"]["gains"]
+        gains[part] = [str(rational(x) * Fraction(gain)) for x in gains[part]]
+        scaled((end, share))(content, claim)
+
+    return change
 
 
 def reversed_torque(content, claim):
@@ -81,10 +100,12 @@ FALSE = {
     "turns from rest": ("bent", scaled(("angle", "3/2"))),
     "samples": ("bent", at_once),
     "between samples": ("biased", nearer),
+    "response of the rate": ("biased", small_response(0, "end.rate", "2/5", "3/5")),
+    "response of the turn": ("biased", small_response(1, "end.angle", "3/5", "13/20")),
     "held torque": ("bent", reversed_torque),
     "highest V": ("bent", lower),
     "limit": ("bent", scaled(("limit", "1/20"))),
-    "end of the angle": ("biased", scaled(("end.angle", "1/10"))),
+    "end of the angle": ("biased", scaled(("end.angle", "9/10"))),
     "end of the rate": ("biased", scaled(("end.rate", "1/1000"))),
     "settling": ("bent", scaled(("settling", "1/1000"))),
 }

@@ -3,14 +3,16 @@ one place, and without each of its hypotheses."""
 
 import copy
 import random
+from fractions import Fraction
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import starhold as sh
 from starhold.algebra.scalar import divide, less, where
-from starhold.algebra.vector import add, cross, dot, scale, subtract
+from starhold.algebra.vector import ZERO, add, cross, dot, scale, subtract
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.detumbling import find_detumbling
 from starhold.certification.evidence.finding import certificate
@@ -21,6 +23,8 @@ from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.programs import digest
 from starhold.laws import b_dot
 from starhold.loop.modes import loop_of_mode
+from starhold.parts.contract import NoParams, Push
+from starhold.parts.part import Fitted, Part
 from starhold.scenario.building import build
 from starhold.trace.straight_line import straight_line
 from tests.kernel.certificates import rekeyed, text
@@ -274,6 +278,17 @@ def test_a_claim_is_compared_with_the_loop_that_flies():
         "part.residual-dipole.dipole": ["outside.across is exceeded"],
         "orbit.altitude": ["field.least is lower"],
     }
+
+
+def test_a_torque_that_grows_with_the_rate_is_compared_at_the_rates_of_the_claim():
+    """A flight that begins slowly may come to turn as fast as the claim covers."""
+    (claim,) = tumbling()["claims"]
+    slow = sh.load("cubesat-detumble").with_({"initial.rate": [0.01, 0.0, 0.0], "environment.gravity_gradient": False})
+    loop, told = build(slow, slow.pick("b-dot")), float(Fraction(claim["numbers"]["outside"]))
+    rubbing = SimpleNamespace(ROLE="environment", torque=lambda *_: ZERO, bound=lambda *_: Push(0.0, 0.5 * told / 0.01))
+    rubs = loop.with_parts(Fitted(Part("rubbing", rubbing), NoParams()))
+    assert differences(claim, loop) == []
+    assert differences(claim, rubs) == ["outside is exceeded"]
 
 
 OTHER = {

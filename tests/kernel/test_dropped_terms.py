@@ -1,5 +1,6 @@
 """Terms of the bounds of a period with wheels: each is needed, for without it a flight of a period exceeds the bound."""
 
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from types import SimpleNamespace
@@ -15,6 +16,7 @@ from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes
+from starhold.kernel.follower import FIRST, REST
 from starhold.kernel.held import MOMENTA, Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import spinning
@@ -96,7 +98,7 @@ class Flight:
 def used(held, tube, left):
     """The largest share that is used of what pushes make of a motion."""
     ways = np.concatenate([np.eye(6), np.random.default_rng(2).normal(size=(300, 6))])
-    most = sum(np.linalg.norm(ways @ floats(B), axis=1) * float(b) for B, b in held.linear(tube))
+    most = sum(np.linalg.norm(ways @ floats(B)[:6], axis=1) * float(b) for B, b in held.linear(tube))
     return float((np.abs(ways @ left) / most[:, None]).max())
 
 
@@ -138,6 +140,33 @@ def test_what_momentum_makes_of_noise_beside_its_own_motion_is_in_the_bound(law,
     tube = held.tube(held.region((held.s + held.G[3][3]) / 2**70))
     assert used(held, tube, left) <= 1.0
     assert dropped(monkeypatch, held, tube, left, *term) > 1.0
+
+
+def test_what_a_law_that_makes_up_for_momentum_does_late_is_in_the_drift_of_the_rates(monkeypatch):
+    """A torque that lags makes up for momentum by as much as it acts in the drift of the linear motion, and at samples at
+    once: what is between is in no matrix, and turns momentum on."""
+    _, own = pushed("wheel")
+    h, lag = own.loop.loop.period, 20.0 * own.loop.loop.period
+    kept, mean = np.exp(-h / lag), lag / h * -np.expm1(-h / lag)
+    late = {"kept": kept, "mean": mean, "moment": lag / h * (1.0 - mean)}
+    late |= {f"{name}_least": (1.0 - 4e-9) * x for name, x in late.items()} | {"weight": 1.0, "begun": 0.0, "rest": 0.0}
+    held, oracle = quiet("wheel", **{f"late_torque_{name}": x for name, x in late.items()})
+    region, size = held.region((held.s + held.G[3][3]) / 2**36), Fraction(oracle.numbers["momentum"])
+    tube = held.tube(replace(region, sizes=region.sizes | {FIRST: Fraction(1, 10**9), REST: Fraction(0)}))
+    x = np.linalg.cholesky(floats(region.X)) @ along(np.random.default_rng(3).normal(size=(6, LANES)))
+    q, w, H = np.concatenate([[np.sqrt(1.0 - (x[TURN] ** 2).sum(0))], x[TURN]]), x[RATE], np.zeros((3, LANES))
+    H[2] = float(size)
+    flight = Flight(held, oracle, momentum=float(size))
+    around, at = flight.around(H), [Fraction(0), Fraction(0), size]
+    command = around.command(flight.asked, q, w, 0.0, 0.0 * H)
+    for _ in range(PARTS):
+        q, w = around.after(q, w, 0.0, command, 0.0 * H, h / PARTS)
+    law, body = spinning(held.loop, at)
+    # Nothing is late at first.
+    y = np.concatenate([x, floats(held.near.torque) @ x + floats(law) @ x[RATE]])
+    left = np.concatenate([w, q[1:]]) - ((floats(held.near.A) + floats(held.near.spun(law, body))) @ y)[:6]
+    assert used(held, tube, left) <= 1.0
+    assert dropped(monkeypatch, held, tube, left, "spun_on", lambda *given: Fraction(0)) > 1.5
 
 
 def sizes_of(held, *states):

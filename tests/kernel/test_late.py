@@ -27,12 +27,14 @@ from starhold.kernel.theorems.pointing import forgotten, on_level
 from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
+from starhold.simulation.lane import fly, label
 from starhold.studies.compare import record
 from tests.certification.attack import Attack, flown
 from tests.kernel.flights import Around, along
 from tests.parts.files import BODY, FILES, PD, part
 from tests.tiers import leading
 
+INERTIA = np.array([2.0, 3.0, 4.0])
 LATE = [(("lag", 0.05),), (("rate-limit", 0.1),), (("lag", 0.5),)]
 
 
@@ -41,6 +43,8 @@ def flying(part, *numbers):
     """A loop with an actuator, and its pointing claim."""
     given = sh.load("three-laws")
     loop = build(given, given.pick("lyapunov")).with_parts(fit("actuator", part, *numbers))
+    # In steps that follow it almost exactly.
+    loop = replace(loop, substeps=40)
     claim, why = pointed(make_subject(loop))
     return loop, claim, why
 
@@ -63,6 +67,7 @@ def test_an_actuator_that_lags_is_in_the_claim_and_no_flight_breaks_it(late):
     assert max(shares) > 0.1
 
 
+@pytest.mark.slow
 def test_one_file_with_an_actuator_that_says_how_late_it_is_is_in_the_claim_checked_and_flown(tmp_path):
     (tmp_path / "drive.py").write_text(FILES["drive.py"])
     text = BODY + "substeps = 8\n" + part('file = "drive.py"\nbandwidth = "2 Hz"\n') + PD
@@ -194,3 +199,24 @@ def test_no_period_exceeds_the_bounds_of_what_is_late_and_some_come_near_them(la
     most = sum(np.linalg.norm(ways @ floats(B)[:6], axis=1) * float(b) for B, b in held.linear(first))
     state = np.vstack([x, floats(held.near.torque) @ x + late[0]])[: len(held.near.A)]
     assert 0.9 < float((np.abs(ways @ (after - floats(held.near.A)[:6] @ state)) / most[:, None]).max()) <= 1.0
+
+
+@pytest.mark.parametrize(("lag", "substeps"), [(0.05, 4), (0.2, 1), (0.3, 1), (1.0, 1), (0.02, 10)])
+def test_what_is_late_in_a_flight_is_within_its_bounds(lag, substeps):
+    """With substeps of half a time constant, which are allowed, it is by much more than rounding from what it is exactly."""
+    craft = {
+        "name": "late",
+        "spacecraft": {"inertia": INERTIA.tolist(), "torque_limit": 1.0, "actuator_lag": lag},
+        "initial": {"angles": ["1 deg", "-2 deg", "1 deg"]},
+        "simulation": {"duration": "10 s", "control_period": 0.1, "substeps": substeps},
+        "law": [{"type": "pd", "k_rate": 0.5, "k_attitude": 0.05}],
+    }
+    scenario = sh.scenario(craft)
+    loop = build(scenario, scenario.laws[0])
+    late = late_torque(loop)
+    run = label(loop, *fly(loop, 1), 1).arrays
+    before, after = (run["command"][0] - run["torque"][k] for k in (0, 1))
+    # From rest, so that no other torque acts.
+    mean = run["command"][0] - INERTIA * (run["rate"][1] - run["rate"][0]) / loop.period
+    for size, most, least in zip((after, mean), (late.kept, late.mean), late.least[:2], strict=True):
+        assert least <= (size / before).min() <= (size / before).max() <= most

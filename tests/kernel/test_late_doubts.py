@@ -24,7 +24,7 @@ from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.polynomials import apply, cross, dot
-from starhold.kernel.regions import TURN
+from starhold.kernel.regions import TURN, settled
 from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
 from tests.kernel.flights import along, rates, stepped
@@ -146,6 +146,11 @@ def test_no_period_exceeds_what_is_late_after_it_and_where_it_takes_the_state(ki
 def test_numbers_of_what_is_never_late_are_refused(late):
     with pytest.raises(RefusedError):
         Lagging(BALL, 0.5, 0.25, 1e-2, 0.1, alike=False, **late)
+
+
+def test_bounds_that_only_grow_are_refused_for_that_and_not_for_how_long_numbers_become():
+    with pytest.raises(RefusedError, match="the period is too long for the rates"):
+        settled(lambda bounds: [1 + 3 * x * x for x in bounds])
 
 
 @pytest.mark.slow

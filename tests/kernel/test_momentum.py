@@ -180,7 +180,6 @@ def test_a_torque_that_is_told_at_a_misread_attitude_is_misread_by_no_more_than_
     bound = float(held.misread(held.region((held.s + held.G[3][3]) / 2**40))[0])
     assert 0.5 * bound < np.linalg.norm(wrong, axis=0).max() <= bound
     held.change = None
-    del held.wrong
     assert float(held.misread(held.region((held.s + held.G[3][3]) / 2**40))[0]) < 0.5 * bound
 
 

@@ -332,8 +332,8 @@ def test_what_is_left_of_the_motion_before_a_response_counts(monkeypatch):
     assert failing(claim, content["programs"]) == {"end of the angle", "end of the rate"}
     begin = Response.__init__
 
-    def dropped(self, count, gains, left):
-        begin(self, count, gains, [[0 * x for x in row] for row in left])
+    def dropped(self, count, gains, left, beside):
+        begin(self, count, gains, [[0 * x for x in row] for row in left], beside)
 
     monkeypatch.setattr(Response, "__init__", dropped)
     assert failing(claim, content["programs"]) == set()

@@ -116,6 +116,7 @@ def test_two_random_torques_are_as_one_of_both():
     assert driven_errors(both).parts == both.used("environment")
 
 
+@pytest.mark.slow
 def test_flights_end_as_near_as_is_proved():
     loop = free(loop_of("lyapunov", lyapunov.examples()[0], sign_policy="shortest"))
     loop = loop.with_parts(fit("environment", "random-torque", 1e-4))

@@ -238,21 +238,50 @@ def of_gyro(random):
     given = gyro.Params(
         bias=vector(random, size(random, 1e-6, 1.0)), resolution=float(random.choice([0.0, size(random, 1e-7, 1.0)]))
     )
-    bound = gyro.error(given).rate
+    if random.uniform() < 0.6:
+        # One of these errors may be much of the whole, or all are.
+        given = given._replace(
+            scale_error=float(random.choice([0.0, random.uniform(-0.5, 0.5)])),
+            mounting_error=vector(random, float(random.choice([0.0, random.uniform(0.0, 0.5)]))),
+            axis_errors=tuple(map(tuple, (float(random.choice([0.0, 0.3])) * random.normal(size=(3, 3))).tolist())),
+            delay=float(random.choice([0.0, size(random, 1e-3, 10.0)])),
+        )
+    bound, q = gyro.error(given), along(np.append(1.0, np.array(given.mounting_error) / 2))
+    skew = (np.eye(3) + np.array(given.axis_errors)) @ turned(np.tile(q, (3, 1)), np.eye(3)).T
 
     def share(x):
-        rate = 0.01 * x[:, :3]
-        shown = rate + np.array(given.bias)
+        # The rate changes evenly for as long as a reading takes.
+        rate, change = 0.01 * x[:, :3], np.exp(2.0 * x[:, 6:7] - 4.0) * along(x[:, 3:6])
+        before = rate - given.delay * change
+        shown = (1.0 + given.scale_error) * before @ skew.T + np.array(given.bias)
         shown = given.resolution * np.round(shown / given.resolution) if given.resolution else shown
-        return np.linalg.norm(shown - rate, axis=1) / bound
+        fast = np.maximum(*(np.linalg.norm(one, axis=1) for one in (rate, before)))
+        most = bound.rate + bound.turned * fast + bound.late * np.linalg.norm(change, axis=1)
+        return np.linalg.norm(shown - rate, axis=1) / most
 
     return share
 
 
 def of_tracker(random):
-    given = star_tracker.Params(0.0, 0.0, mounting_error=vector(random, random.uniform(0.0, 0.5)))
-    turn = 2.0 * np.arctan(np.linalg.norm(given.mounting_error) / 2.0)
-    return lambda x: np.full(len(x), turn) / star_tracker.error(given).attitude
+    period, delay = size(random, 0.01, 10.0), float(random.choice([0.0, random.uniform(0.0, 3.0)]))
+    given = star_tracker.Params(0.0, 0.0, mounting_error=vector(random, random.uniform(0.0, 0.5)), delay=delay * period)
+    bound, whole = star_tracker.error(given), np.floor(delay)
+    mounted = along(np.append(1.0, np.array(given.mounting_error) / 2))
+
+    def share(x):
+        # It turns evenly, by up to 2 rad in a period; between control steps the quaternion is interpolated.
+        rate = 2.0 / period * np.abs(np.tanh(x[:, :1])) * along(x[:, 1:4])
+
+        def before(steps):
+            half = -0.5 * steps * period * np.linalg.norm(rate, axis=1)[:, None]
+            return np.concatenate([np.cos(half), np.sin(half) * along(rate)], axis=1)
+
+        seen = along(before(whole) + (delay - whole) * (before(whole + 1.0) - before(whole)))
+        q0 = seen[:, 0] * mounted[0] - seen[:, 1:] @ mounted[1:]
+        most = bound.attitude + bound.turning * np.linalg.norm(rate, axis=1)
+        return 2.0 * np.arccos(np.minimum(np.abs(q0), 1.0)) / most
+
+    return share
 
 
 ATTACKS = {

@@ -121,6 +121,7 @@ def test_ticks_say_in_plain_text_what_their_formulas_say(log: bool, values: list
         *((log, values, 2.0) for log in (False, True) for values in RANGES),
     ],
 )
+@pytest.mark.usefixtures("quiet_plots")
 def test_an_axis_is_drawn_as_matplotlib_draws_it(log: bool, values: list[float], end: float) -> None:
     drawn = list[Any]()
     for by_one_tick in (False, True):

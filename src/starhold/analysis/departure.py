@@ -89,6 +89,11 @@ class Span:
         tests = (unmet for name in claim.assumptions if (unmet := assumption(name).unmet) is not None)
         return [one for unmet in tests for where, how in unmet(self) for one in self.first(where, how)]
 
+    def unmet_throughout(self, claim: Claim) -> list[str]:
+        """Return how the loop does not meet a claim's assumptions, whatever its motion."""
+        tests = (unmet for name in claim.assumptions if (unmet := assumption(name).unmet) is not None)
+        return [how for unmet in tests for where, how in unmet(self) if not np.ndim(where) and where]
+
 
 def departures(
     certificate: Certificate,

@@ -27,6 +27,7 @@ from starhold.campaign.results import ByClaim, Within
 from starhold.campaign.worst import Sought
 from starhold.certification.certificate import Claim
 from starhold.certification.comparison import differences
+from starhold.certification.unmodelled import named
 from starhold.certification.wording import enumerated, sentence
 from starhold.kernel.numbers import rational
 from starhold.loop.closed_loop import ClosedLoop, is_recorded
@@ -264,7 +265,9 @@ def _apart(about: Subject, loop: ClosedLoop) -> tuple[bool, bool]:
     now, mode = replace(loop, events=()), about.issued.mode
     now = now if mode is None else loop_of_mode(now, mode - 1)
     stays = not about.issued.step and all(event.step > about.steps for event in loop.events)
-    alike = stays and not differences(proof.claim, now)
+    # Other numbers of a part may have no bounds.
+    (whole,) = named([replace(about.claim, assumptions=())], now, about.claim.numbers.get("momentum", 0.0))
+    alike = stays and not (differences(proof.claim, now) or whole.left_out or whole.limited_to(about.steps * now.period))
     begins = alike and mode in (None, 1)
     return alike, begins and start_inside(about.issued.certificate, now).get("pointing", False)
 

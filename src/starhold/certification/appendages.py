@@ -1,14 +1,19 @@
-"""The appendages of a loop, whose motion is a program of the kernel: of the equations that fly, with all their numbers."""
+"""The appendages of a loop, whose motion is a program of the kernel: of the equations that fly, with all their numbers; and
+whether laws are told of what effectors store."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from starhold.algebra.operations import UnreadableError
 from starhold.algebra.structure import leaves, mapped
 from starhold.algebra.vector import ZERO
+from starhold.errors import InputError
+from starhold.laws.program import law_program
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
 from starhold.parts.part import Fitted
@@ -16,6 +21,8 @@ from starhold.trace.straight_line import straight_line
 
 TAKING = ("command", "switch", "pulse", "push", "bound")
 """Equations of effectors that are no appendages: they take commands, move the orbit, or have a bound of their own."""
+TOLD_MOMENTUM = "measurement.wheel_momentum."
+"""How the inputs of a law's program begin that are what effectors tell it of their momentum."""
 
 
 def appendages(loop: ClosedLoop) -> tuple[Fitted, ...]:
@@ -69,6 +76,27 @@ def recorded_states(loop: ClosedLoop, arrays: Mapping[str, Any]) -> Any:
     return np.hstack([np.atleast_2d(x.T).T for x in columns])
 
 
+def tells_momentum(loop: ClosedLoop, fitted: Fitted) -> bool:
+    """Return whether a law reads the momentum that effectors have, and this one may have some."""
+    measured: Any = fitted.part.hook("measured_momentum") or fitted.part.hook("momentum")
+    if measured is None:
+        return False
+    params = fitted.prepared(loop.period)
+    state = fitted.remembered(params)
+
+    def read(state: Any) -> Any:
+        return measured(state, params)
+
+    stored = straight_line(read, state=state)
+    try:
+        law = law_program(loop.law, loop.gains, loop.known, loop.period, loop.remembers)
+    except (InputError, UnreadableError):
+        return True
+    reads = any(name.startswith(TOLD_MOMENTUM) for name in law["inputs"])
+    return reads and (bool(stored["inputs"]) or any(read(state)))
+
+
 def _alone(loop: ClosedLoop) -> ClosedLoop:
-    others = {f.part.name for f in loop.used("effector") if f not in appendages(loop)}
-    return loop.without("sensor", "estimator", "watcher", "environment", "actuator", *others)
+    moved, bare = appendages(loop), loop.without("sensor", "estimator", "watcher", "environment", "actuator")
+    # Not by their names, which parts of two files may share.
+    return replace(bare, parts=tuple(f for f in bare.parts if f.part.role != "effector" or f in moved))

@@ -215,6 +215,7 @@ ASSUMPTIONS = {
         "held-torque",
         "late-torque",
         "late-alike",
+        "late-told",
         # The distribution of noise cannot be told from one flight.
         "gaussian-noise",
         "linear-estimate",

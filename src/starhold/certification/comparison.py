@@ -18,12 +18,12 @@ from starhold.certification.evidence.starts import POINTS
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
+from starhold.certification.measured import driven_errors
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import (
-    LARGER,
+    GROWING,
     Pushes,
     change_of_modelled,
-    driven_errors,
     late_torque,
     noisy_fields,
     samples_of,
@@ -67,7 +67,8 @@ def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]
 
 def _of_detumbling(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     try:
-        words, numbers = bounds_of(recorded.known)
+        # Torques that grow with the rate do so up to the largest one of the claim.
+        words, numbers = bounds_of(recorded.known, above(rational(claim["numbers"]["rate.0"])))
     except NotFoundError as reason:
         yield str(reason)
         return
@@ -113,6 +114,8 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if claim["theorem"] in BOUNDED:
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
+        # Without what grows as the body moves its parts are left out by name.
+        known = replace(known, lags=not numbers.keys().isdisjoint(GROWING))
         pushed = known.against(envelope).numbers
         if "share" in numbers and (driven := driven_errors(loop)) is not None:
             pushed[DEVIATION] = driven.torque
@@ -161,9 +164,9 @@ def _late(numbers: Mapping[Any, Fraction], late: Late | None) -> Iterator[str]:
     if late is None:
         yield "its torque is not late"
         return
-    for name in KNOWN:
+    for k, name in enumerate(KNOWN):
         x, least = getattr(late, name), stated.get(f"{name}.least")
-        off = least is not None and (late.moment is None or least > fraction(x / LARGER))
+        off = least is not None and (late.moment is None or least > fraction(late.least[k]))
         if off or (name in stated and stated[name] < fraction(x)):
             yield "its torque is late otherwise"
     if isfinite(late.most) and ("most" not in stated or stated["most"] > fraction(late.most)):

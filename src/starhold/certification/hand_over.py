@@ -10,8 +10,10 @@ from starhold.certification.certify import between_samples, undecided
 from starhold.certification.matrices import above
 from starhold.certification.proofs import taken_over
 from starhold.certification.subject import described, make_subject
+from starhold.certification.target_motion import motion_of
 from starhold.certification.unmodelled import is_read, named
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import AT_REST
 from starhold.parts.effectors.wheels import gives_allocated_torque
 from starhold.parts.part import same_numbers
 
@@ -48,11 +50,19 @@ def flown_ends(
     inf for no bound. last: the claim of the mode before, if that has settled; claim: that of the next mode, which has the
     errors of what the tests look at."""
     errors = {name: 0.0 if claim is None else claim.numbers[error] for name, error in TESTS.items()}
+    errors["rate_below"] += 0.0 if claim is None else misjudged(before, claim)
     tested = {name: x + errors[name] for name, x in levels.items() if name in TESTS}
     settled = {} if last is None else {"rate_below": last.numbers["rate"], "angle_below": last.numbers["angle"]}
     reached = [[inf if x is None else x for x in ends(condition, before, after)] for condition in (tested, settled)]
     rate, angle = map(min, zip(*reached, strict=True))
     return rate, angle
+
+
+def misjudged(loop: ClosedLoop, claim: Claim) -> float:
+    """Return by how much the rate of a loop's target (rad/s) is off at most as its law is told it: it is told where the
+    target turns in body axes, with the errors of the attitude in a claim."""
+    off = (motion_of(loop) or AT_REST).off_rate
+    return claim.numbers["attitude_error"] * above(make_subject(loop).target_rate) + off
 
 
 def ends(levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop) -> Ends:

@@ -28,6 +28,7 @@ from starhold.certification.evidence.refuted import (
 from starhold.certification.evidence.starts import POINTS
 from starhold.certification.matrices import above, below
 from starhold.certification.subject import Subject
+from starhold.certification.unmodelled import GROWING, grows
 from starhold.kernel.check import Proved, check
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.rules import Exceeds
@@ -99,10 +100,11 @@ def _find_pointed(loop: Loop, like: Mapping[str, Any] | None, begun: float | Non
 
     if like is not None:
         tolerance = float(Fraction(like["tolerance"])) if "tolerance" in like else None
-    loop.known = replace(loop.known, tolerance=tolerance, lags=like is None or "late.torque.mean" in like)
+    late = {"late.torque.mean", *GROWING}
+    loop.known = replace(loop.known, tolerance=tolerance, lags=like is None or not late.isdisjoint(like))
     if find_pointed(loop, like, begun):
         return
-    if like is None and loop.known.late:
+    if like is None and (loop.known.late or grows(loop.loop)):
         why = loop.failed.get(POINTS, "no proof was found")
         loop.known = replace(loop.known, lags=False)
         if find_pointed(loop, like, begun):
@@ -286,6 +288,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         numbers["late.torque.weight"] * numbers["late.torque.begun"] ** 2 if "late.torque.mean" in numbers else Fraction(0)
     )
     ends = {"level": "highest", "settling": "settling", "angle": "end.angle", "rate": "end.rate"}
+    grown = [float(numbers.get(name, 0)) for name in GROWING]
     return {
         "period": float(numbers["period"]),
         "slew_angle": angle,
@@ -300,6 +303,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         **{name: float(numbers[name]) for name in ("momentum", "memory") if name in numbers},
         **({"plan_error": above(numbers["plan.error"])} if "plan.error" in numbers else {}),
         **({"late_torque": below(numbers["late.torque.begun"])} if "late.torque.begun" in numbers else {}),
+        **({"told_growth": grown} if any(grown) else {}),
         "start": above(numbers["level"] - behind),
         **{name: above(numbers[key]) for name, key in ends.items()},
     }

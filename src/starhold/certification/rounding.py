@@ -1,6 +1,7 @@
 """Numbers in sentences, rounded so that no more is said than is proved."""
 
 import math
+from collections.abc import Iterator, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 
@@ -23,3 +24,12 @@ def angle(radians: float, up: bool = False) -> str:
 def speed(rate: float, up: bool = False) -> str:
     """A rate in degrees a second."""
     return shown(math.degrees(rate), "°/s", up)
+
+
+def growing(sizes: Sequence[float] | None) -> Iterator[str]:
+    """Word what errors of what the law is told are more as the body moves."""
+    sizes = sizes or (0.0,) * 4
+    for name, units, (turning, hurrying) in (("attitude", (" s", " s^2"), sizes[:2]), ("rate", ("", " s"), sizes[2:4])):
+        kinds = zip((turning, hurrying), units, ("rate", "acceleration"), strict=True)
+        grown = [f"{shown(x, unit)} times the body's {of}" for x, unit, of in kinds if x]
+        yield from [f"errors of the {name} of up to {' and '.join(grown)}"] if grown else []

@@ -35,7 +35,7 @@ def certify_station(loop: ClosedLoop, name: str = "") -> Certificate:
             claims = _rest(station)
     content = certificate(list(station.programs.values()), station.claims)
     shown = zip(check(json.dumps(content)) if station.claims else (), station.claims, strict=True)
-    made = [_made(*next(shown), station) if claim is None else claim for claim in claims]
+    made = [made_of_station(*next(shown), station) if claim is None else claim for claim in claims]
     return Certificate(name or law.name, described_station(loop), named(made, loop))
 
 
@@ -101,7 +101,7 @@ AGAINST = {MORE: ("control", "control", "y", "z"), HELD: ("only the circle", "ra
 """The obligation that fails by each theorem that refutes, and the numbers that show it."""
 
 
-def _made(proved: Proved, given: Mapping[str, Any], station: Station) -> Claim:
+def made_of_station(proved: Proved, given: Mapping[str, Any], station: Station) -> Claim:
     """Return a claim with the numbers, assumptions and obligations that the kernel reports."""
     statement = proved.statement
     numbers = {name: float(x) for name, x in proved.claim.numbers.content.items()}

@@ -22,10 +22,11 @@ from starhold.certification.matrices import (
     rows,
     upper,
 )
+from starhold.certification.measured import driven_errors
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
 from starhold.certification.target_motion import motion_of, perigee
-from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, is_read, late_torque, pushes
+from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, grows, is_read, late_torque, pushes
 from starhold.errors import InputError
 from starhold.kernel.numbers import Rows, plus
 from starhold.laws.catalogue import Law
@@ -51,7 +52,7 @@ class Subject:
     total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels;
     tolerance: in the pointing claim the inertia's entries are off by this share of sqrt(J_ii J_kk) at most, None where the
     inertia is as given; pull: bound of the torque that an inertia of one has by the gravity gradient (1/s2); lags: whether
-    the pointing claim is about how late the torque is too."""
+    the pointing claim is about what is late too: the torque, and what the law is told as the body moves."""
 
     loop: ClosedLoop
     disturbance: Any
@@ -77,12 +78,18 @@ class Subject:
     def against(self, envelope: Envelope) -> Pushes:
         """Return bounds of what acts on the loop and is told to no law, the pull on what the inertia is off by included."""
         bounds = pushes(self.loop, envelope)
+        bounds = bounds if self.lags else bounds.steady
         return bounds._replace(outside=bounds.outside + float(self.disturbance) + above(self.pull) * self.off)
 
     @property
     def late(self) -> Late | None:
         """How late the torque is in the pointing claim."""
         return late_torque(self.loop) if self.lags else None
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the pointing claim is about noise, as far as the parts with it are not left out for what is late."""
+        return driven_errors(self.loop) is not None and (self.lags or not grows(self.loop))
 
     @property
     def moving(self) -> bool:

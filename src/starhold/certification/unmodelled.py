@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import replace
-from math import ceil, hypot, inf, isfinite
+from functools import reduce
+from math import ceil, inf, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from starhold.algebra.quaternion import NO_TURN
-from starhold.algebra.structure import leaves
-from starhold.algebra.vector import Vector, apply, norm, scale
-from starhold.certification.appendages import appendages
+from starhold.algebra.vector import norm
+from starhold.certification.appendages import appendages, tells_momentum
 from starhold.certification.certificate import LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
+from starhold.certification.measured import (
+    Told,
+    as_read,
+    bounded,
+    driven_errors,
+    is_random,
+    measured,
+    noise_of,
+    shown,
+    tells_place,
+)
 from starhold.certification.orbit_band import band_of, extremes, movers
 from starhold.certification.target_motion import motion_of
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import AT_REST, DEVIATIONS, NO_ERRORS, Envelope, Errors, Late, Noise, Push, Recursion
+from starhold.parts.contract import AT_REST, DEVIATIONS, NO_ERRORS, Envelope, Late, Push
 from starhold.parts.craft import tensor
 from starhold.parts.orbit import period_of
 from starhold.parts.part import Fitted, Part
@@ -36,16 +45,28 @@ DETUMBLING = "detumbling"
 """The kind of claims about a law that opposes the change of the magnetic field."""
 SPAN = 3600.0
 """The time (s) covered by a claim with a share where there is no orbit."""
-TELLING, COMMANDED = ("sensor", "estimator"), ("actuator", "effector")
-"""Roles whose `error` affects the law's measurements, and its command."""
+COMMANDED = ("actuator", "effector")
+"""Roles whose `error` affects the law's command."""
+GROWING = (
+    "error.attitude.per.rate",
+    "error.attitude.per.acceleration",
+    "error.rate.per.rate",
+    "error.rate.per.acceleration",
+    "error.ago",
+    "error.kept",
+)
+"""The numbers of a claim about errors of what the law is told that grow as the body moves."""
+SETTLED = ("linear-estimate", "settled-estimate")
+"""What a claim about an estimate assumes of it."""
 MORE, LARGER = 1.0 + 1e-12, 1.0 + 1e-6
-"""A margin for the floating-point sum, and one for how a flight follows a lag in steps of at most a tenth of it."""
+"""A margin for the floating-point sum, and one for numbers that other machines may round otherwise."""
 
 
 class Pushes(NamedTuple):
     """Bounds of what acts on a loop and is told to no law: the torque from outside (N m, and N m s times the body's rate),
     errors of the attitude (rad) and the rate (rad/s) that the law is told, of the command (as the torque), and of the
-    target's rate (rad/s) and acceleration (rad/s2)."""
+    target's rate (rad/s) and acceleration (rad/s2); and what errors that the law is told are more as the body moves, as of
+    `Told`."""
 
     outside: float
     outside_per_rate: float = 0.0
@@ -55,21 +76,19 @@ class Pushes(NamedTuple):
     command_per_rate: float = 0.0
     target_rate: float = 0.0
     target_acceleration: float = 0.0
+    more: tuple[float, ...] = (0.0,) * len(GROWING)
 
     @property
     def numbers(self) -> dict[str, float]:
         """The numbers of a claim that they are."""
         names = ("outside", "outside.per.rate", "error.attitude", "error.rate", "error", "error.per.rate")
-        return dict(zip((*names, "error.target.rate", "error.target.acceleration"), self, strict=True))
+        names = (*names, "error.target.rate", "error.target.acceleration", *GROWING)
+        return dict(zip(names, (*self[:-1], *self.more), strict=True))
 
-
-class Driven(NamedTuple):
-    """Noise-driven errors, the parts with the noise, and the parts with the errors; the deviation of a random torque about
-    each axis (N m)."""
-
-    recursion: Recursion
-    parts: tuple[Fitted, ...]
-    torque: float = 0.0
+    @property
+    def steady(self) -> Pushes:
+        """Without what grows as the body moves."""
+        return self._replace(more=Pushes(0.0).more)
 
 
 def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
@@ -90,33 +109,60 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     for fitted in _acting(loop):
         for pushed, push in zip((torques, errors), _pushes(fitted, envelope), strict=True):
             pushed += [] if push is None else [push]
-    driven = driven_errors(loop)
-    estimated = _estimated(loop, driven)
-
-    def counts(fitted: Fitted) -> bool:
-        # A part that is left out for its noise is left out with its other errors.
-        noisy = driven is not None and fitted in driven.parts
-        return fitted not in estimated and (noisy or not _is_random(_noise(fitted, loop.period)))
-
-    bounds = [NO_ERRORS, *(bound for f in _acting(loop) if (bound := _bounded(f)) is not None and counts(f))]
-    attitude, rate, *_ = (sum(sizes) for sizes in zip(*bounds, strict=True))
+    attitude, rate, *more = reduce(Told.__add__, [amiss for _, amiss in _told(loop)], Told())
     (torque, per_rate), (command, command_per_rate) = (
         [sum(x) for x in zip(*pushed, strict=True)] for pushed in (torques, errors)
     )
     motion = motion_of(loop) or AT_REST
     off = motion.off_rate, motion.off_acceleration
-    return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *off)))
+    sizes = (x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *off))
+    return Pushes(*sizes, more=tuple(x * MORE for x in more))
+
+
+def _told(loop: ClosedLoop) -> list[tuple[tuple[Fitted, ...], Told]]:
+    """Return the errors of what a law is told besides noise, with the parts that they come from."""
+    result = measured(loop)
+    together = () if result is None else result.parts
+    amiss = [] if result is None else [(together, result.amiss)]
+    for f in _acting(loop):
+        # A part that is left out for its noise is left out with its other errors.
+        errors = None if f in together or is_random(noise_of(f, loop.period)) else bounded(f, loop.period)
+        amiss += [] if errors is None else [((f,), as_read(errors))]
+    return amiss
+
+
+def grows(loop: ClosedLoop) -> bool:
+    """Whether errors of what a law is told grow as the body moves."""
+    return any(amiss.grows for _, amiss in _told(loop))
 
 
 def late_torque(loop: ClosedLoop) -> Late | None:
-    """Return how late the torque is, with a margin for rounding; None where no actuator tells, or more than one is late."""
+    """Return how late the torque is, exactly and as flights follow a lag in their steps, with a margin for rounding; None
+    where no actuator tells, or more than one is late."""
     actuators = _moving(loop)
     tell: Any = actuators[0].part.hook("late") if len(actuators) == 1 else None
     if tell is None:
         return None
     late: Late = tell(actuators[0].params, loop.period)
-    moment = None if late.moment is None else late.moment * LARGER
-    return Late(late.kept * LARGER, late.mean * LARGER, late.most / LARGER, moment)
+    most = late.most / LARGER
+    if late.moment is None:
+        return Late(late.kept * LARGER, late.mean * LARGER, most)
+    exact = late.kept, late.mean, late.moment
+    pairs = [*zip(exact, _in_steps(actuators[0].fastest, loop) or exact, strict=True)]
+    kept, mean, moment = (max(pair) * LARGER for pair in pairs)
+    return Late(kept, mean, most, moment, tuple(min(pair) / LARGER for pair in pairs))
+
+
+def _in_steps(fastest: float, loop: ClosedLoop) -> tuple[float, ...]:
+    """Return what flights make of a lag in the steps of the fourth-order method: what is late in the end of a period, in its
+    mean, and in that by the time that is left, as shares of what it is first; nothing without a rate at which it settles."""
+    step, kept, mean, moment = 1.0 / loop.substeps, 1.0, 0.0, 0.0
+    x = fastest * loop.period * step
+    for _ in range(loop.substeps):
+        moment += step * (mean + step * kept * (0.5 - x / 6.0 + x * x / 24.0))
+        mean += step * kept * (1.0 - x / 2.0 + x * x / 6.0 - x**3 / 24.0)
+        kept *= 1.0 - x + x * x / 2.0 - x**3 / 6.0 + x**4 / 24.0
+    return (kept, mean, moment) if x else ()
 
 
 def _moving(loop: ClosedLoop) -> list[Fitted]:
@@ -138,60 +184,11 @@ def change_of_modelled(loop: ClosedLoop, envelope: Envelope) -> Push:
     for a part that does not say, or if a position is told that could be off."""
     parts = [f for f in loop.used("environment") if f.part.flag("MODELLED")]
     tells: list[Any] = [f.part.hook("torque_change") for f in parts]
-    telling = [*(_shown(f) for f in loop.used("sensor")), *(f.part.module.Estimate._fields for f in loop.used("estimator"))]
-    if None in tells or any("position" in names for names in telling):
+    telling = (*loop.used("sensor"), *loop.used("estimator"))
+    if None in tells or any(tells_place(f) for f in telling):
         return Push(inf, inf)
     declared = [Push(0.0), *(tell(f.params, loop.craft, envelope) for tell, f in zip(tells, parts, strict=True))]
     return Push(*(sum(x) * MORE for x in zip(*declared, strict=True)))
-
-
-def driven_errors(loop: ClosedLoop) -> Driven | None:
-    """Return what noise drives in a loop: errors of what its law is told, which are none where its parts do not say them,
-    and random torques from outside. None without either, and where the target depends on the law's mode."""
-    if loop.target.part.flag("BY_MODE"):
-        return None
-    driven = _told_errors(loop)
-    torques = [fitted for fitted in loop.used("environment") if _noise(fitted, loop.period).torque]
-    if driven is None and torques:
-        driven = Driven(_as_read(Noise()), ())
-    if driven is None:
-        return None
-    return driven._replace(
-        parts=(*driven.parts, *torques), torque=hypot(*(_noise(fitted, loop.period).torque for fitted in torques))
-    )
-
-
-def _told_errors(loop: ClosedLoop) -> Driven | None:
-    """Return the noise-driven errors of an estimate, or of readings that the law uses directly; None without noise, where
-    parts do not fully declare it, where an estimator leaves other errors in, and where sensors of one quantity are not read
-    together.
-    """
-    estimators = loop.used("estimator")
-    wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
-    sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
-    declared = all(f.part.hook("noise") is not None and _is_removed(_bounded(f), bool(estimators)) for f in sensors)
-    if not sensors or not declared:
-        return None
-    noise = Noise()
-    several = getattr(estimators[0].part.module, "SEVERAL", ()) if estimators else ()
-    attitudes, rates = ([_noise(f, loop.period) for f in sensors if name in _shown(f)] for name in ("attitude", "rate"))
-    if len(rates) > 1 or (
-        len(attitudes) > 1 and ("attitude" not in several or len({reading.every for reading in attitudes}) > 1)
-    ):
-        return None
-    for reading in attitudes[:1]:
-        noise = noise._replace(
-            attitude=reading.attitude, every=reading.every, more=tuple(other.attitude for other in attitudes[1:])
-        )
-    for reading in rates:
-        noise = noise._replace(rate=reading.rate, walk=reading.walk)
-    if estimators:
-        tell: Any = estimators[0].part.hook("recursion")
-        recursion = None if tell is None else tell(estimators[0].params, noise, loop.period, _rate(loop))
-    else:
-        as_it_is = noise.walk or noise.every > 1 or not _is_random(noise)
-        recursion = None if as_it_is else _as_read(noise)
-    return None if recursion is None else Driven(recursion, (*sensors, *estimators))
 
 
 def samples_of(loop: ClosedLoop) -> int:
@@ -209,8 +206,7 @@ def assumed_away(loop: ClosedLoop) -> list[str]:
 
 def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple[Claim, ...]:
     """Return the claims with an assumption for each part that they leave out."""
-    away, driven = assumed_away(loop), driven_errors(loop)
-    estimated = _estimated(loop, driven)
+    away, driven, amiss = assumed_away(loop), driven_errors(loop), _told(loop)
 
     def more(claim: Claim) -> tuple[str, ...]:
         if claim.kind == DETUMBLING and claim.outcome == "proved":
@@ -222,12 +218,19 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         envelope = envelope_of(loop, momentum, bool(noisy))
         moved = appendages(loop) if claim.kind == "appendages" else ()
         there = (*noisy, *moved, *(_moving(loop) if claim.numbers.get("late_torque") else ()))
-        absent = [
-            f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope, f in estimated))
-        ]
+        grown = "told_growth" in claim.numbers
+        # What grows is in the claim or the parts are not, nor is what noise drives of them.
+        left = [f for parts, one in amiss if one.grows and not grown for f in parts]
+        left += [] if driven is None or noisy else driven.parts
+        telling = [f for parts, _ in amiss for f in parts if f not in left]
+        there = [f for f in (*there, *telling) if f not in left]
+        absent = [f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope))]
+        estimated = any(f in telling for f in loop.used("estimator"))
+        settled = [name for name in SETTLED if estimated and name not in claim.assumptions]
         share = band_of(loop).share
         behind = [f"{LATE}{claim.numbers['late_torque']!r}"] if claim.numbers.get("late_torque") else []
-        return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []), *behind)
+        names = (f"{WITHOUT}{_called(f)}" for f in absent)
+        return (*names, *([f"{ORBIT}{share:.3g}"] if share else []), *behind, *settled)
 
     target = motion_of(loop) or AT_REST
     moved = [STEADY] * target.jumps + [f"{UNTIL}{target.until:.6g}"] * isfinite(target.until)
@@ -245,7 +248,7 @@ def _acting(loop: ClosedLoop) -> tuple[Fitted, ...]:
     read = {*loop.law.reads, *(name for f in parts for name in (*f.part.reads, *f.needs))}
     # Without an estimator what sensors tell of the state takes its place.
     read |= set() if loop.used("estimator") else {*loop.start._fields}
-    return tuple(f for f in parts if f.part.role != "sensor" or _shown(f) & read or not _shown(f) & watched)
+    return tuple(f for f in parts if f.part.role != "sensor" or shown(f) & read or not shown(f) & watched)
 
 
 def _called(fitted: Fitted) -> str:
@@ -264,32 +267,37 @@ def _is_modelled(part: Part) -> bool:
     return part.name in READ.get(part.role, ()) and part.file is None
 
 
-def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, estimated: bool) -> bool:
-    """Whether all that a part does to a loop has a bound. estimated: an estimator takes its errors out."""
+def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
+    """Whether all that a part does to a loop beside what the law is told has a bound."""
     part, banded = fitted.part, fitted in movers(loop) and bool(band_of(loop).share)
-    always = part.hook("acceleration") is not None and not hasattr(fitted.params, "moves_orbit")
-    if moves(fitted.params) or (always and not banded):
+    if moves(fitted.params) or (_always_moves(fitted) and not banded):
         # No claim follows an orbit that such a force changes.
         return False
     if banded and not part.hook("torque"):
         return True
     torque, error = (push is not None for push in _pushes(fitted, envelope))
     if part.role == "effector":
-        # Beside the command an effector reacts as its momentum turns with the body.
-        return torque and (error or not part.flag("ACTS"))
-    if _is_idle(loop, fitted, envelope) or torque or error:
-        return True
-    return not estimated and _bounded(fitted) is not None and not _is_random(_noise(fitted, loop.period))
+        # Beside the command an effector reacts as its momentum turns with the body. No bound is one of its inertia, or of
+        # what a law makes of its momentum.
+        sized = torque and part.hook("inertia") is None
+        return sized and (not part.flag("ACTS") or (error and not tells_momentum(loop, fitted)))
+    return _is_idle(loop, fitted, envelope) or torque or error
+
+
+def _always_moves(fitted: Fitted) -> bool:
+    """Return whether a part moves the orbit, whatever its parameters are."""
+    return fitted.part.hook("acceleration") is not None and not hasattr(fitted.params, "moves_orbit")
 
 
 def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool:
     """Whether a claim about detumbling includes a part: what it is about, environments with a bound, and all that the law
     does not look at."""
     part = fitted.part
-    if part.role == "sensor" and "magnetic_field" in _shown(fitted):
-        return _bounded(fitted) == NO_ERRORS and not _is_random(_noise(fitted, period))
+    if part.role == "sensor" and "magnetic_field" in shown(fitted):
+        return bounded(fitted, period) == NO_ERRORS and not is_random(noise_of(fitted, period))
     if part.role == "environment":
-        return _is_modelled(part) or (_pushes(fitted, envelope)[0] is not None and not moves(fitted.params))
+        still = not moves(fitted.params) and not _always_moves(fitted)
+        return _is_modelled(part) or (_pushes(fitted, envelope)[0] is not None and still)
     return part.role in ("sensor", "estimator", "target") or part.name in ("magnetorquers", "inactive-wheels")
 
 
@@ -307,75 +315,22 @@ def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | Non
     return torque, error
 
 
-def _estimated(loop: ClosedLoop, driven: Driven | None) -> Collection[Fitted]:
-    """Return the parts whose errors other than noise do not count, because an estimator removes them."""
-    return driven.parts if driven is not None and loop.used("estimator") else ()
-
-
-def _bounded(fitted: Fitted) -> Errors | None:
-    """Read the declared largest errors of a part besides its noise, where they are finite."""
-    tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING else None
-    largest = NO_ERRORS if tell is None else tell(fitted.params)
-    return None if tell is None or not all(map(isfinite, largest)) else largest
-
-
-def _is_removed(errors: Errors | None, estimated: bool) -> bool:
-    """Return whether bounded errors besides noise do not reach the law: an estimator removes a bias of the rate alone. What
-    it makes of a tracker that is mounted askew, or of a reading in steps, no part states."""
-    return errors is not None and (not estimated or (errors.attitude == 0.0 and errors.rate == errors.bias))
-
-
 def _field_error(fitted: Fitted, period: float, noisy: bool) -> float:
     """Return the largest error (T) of a measured magnetic field; its noise is bounded except for a share of times."""
-    if "magnetic_field" not in _shown(fitted):
+    if "magnetic_field" not in shown(fitted):
         return 0.0
-    error, deviation = _bounded(fitted), _noise(fitted, period).field
+    error, deviation = bounded(fitted, period), noise_of(fitted, period).field
     return inf if error is None or (deviation and not noisy) else error.field + DEVIATIONS * deviation
 
 
 def noisy_fields(loop: ClosedLoop) -> int:
     """Return how many sensors measure the magnetic field with noise."""
-    return sum(bool(_noise(fitted, loop.period).field) for fitted in loop.used("sensor"))
-
-
-def _noise(fitted: Fitted, period: float) -> Noise:
-    """Return the noise of a part, by default none."""
-    tell: Any = fitted.part.hook("noise")
-    return Noise() if tell is None else tell(fitted.params, period)
-
-
-def _is_random(noise: Noise) -> bool:
-    """Return whether a reading differs from the present value by an unbounded error."""
-    return any(leaves(noise._replace(every=noise.every - 1)))
-
-
-def _as_read(noise: Noise) -> Recursion:
-    """Return the errors of readings that the law uses directly, without a random-walk bias and held attitudes, which are
-    unbounded."""
-
-    def read(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
-        misread = apply(noise.attitude, random[2]), scale(noise.rate, random[0])
-        return misread, *misread
-
-    return Recursion(read, read, 1, 2)
-
-
-def _rate(loop: ClosedLoop) -> Vector:
-    """Return the rate (rad/s) of a body on target as the loop starts, to six digits, on which all machines agree."""
-    target = loop.target
-    rate: Any = target.part.module.goal(target.prepared(loop.period), loop.start, 0, NO_TURN).rate
-    x, y, z = (float(f"{part:.6g}") for part in rate)
-    return x, y, z
-
-
-def _shown(sensor: Fitted) -> set[str]:
-    """Return the names of a sensor's readings."""
-    return set(sensor.part.module.Reading._fields)
+    return sum(bool(noise_of(fitted, loop.period).field) for fitted in loop.used("sensor"))
 
 
 def _is_idle(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
     """Return whether all readers of a sensor are parts whose torque is bounded for any reading."""
-    if fitted.part.role != "sensor" or _shown(fitted) & {*loop.start._fields, *loop.law.reads}:
+    if fitted.part.role != "sensor" or shown(fitted) & {*loop.start._fields, *loop.law.reads}:
         return False
-    readers = [f for f in _acting(loop) if _shown(fitted) & {*f.part.reads, *f.needs}]
+    readers = [f for f in _acting(loop) if shown(fitted) & {*f.part.reads, *f.needs}]
     return all(f.part.role == "effector" and _pushes(f, envelope)[0] is not None for f in readers)

@@ -9,7 +9,7 @@ from typing import Any, cast
 from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS
 from starhold.certification.certificate import FILE, ORBIT, STEADY, UNTIL, Certificate, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
-from starhold.certification.rounding import angle, shown, speed
+from starhold.certification.rounding import angle, growing, shown, speed
 from starhold.laws.catalogue import file_of, known_law
 
 HEADINGS = {
@@ -227,13 +227,13 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
 
     def pushed(name: str) -> str:
-        more = f" and {shown(growing, ' N m s')} times the body's rate" if (growing := n[f"{name}_per_rate"]) else ""
+        more = f" and {shown(grown, ' N m s')} times the body's rate" if (grown := n[f"{name}_per_rate"]) else ""
         return f"of up to {shown(n[name], ' N m')}{more}"
 
     random = f", random ones of up to {shown(n['random_torque'], ' N m')}" if "random_torque" in n else ""
     bounds = [f"torques from outside {pushed('torque')}{' beside those that the law is told' * bool(n['told'])}{random}"]
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name] > 1e-12]
-    bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
+    bounds += [*growing(n.get("told_growth")), *([f"errors of the command {pushed('error')}"] if n["error"] else [])]
     bounds += [f"a lag of the torque, at first of up to {shown(n['late_torque'], ' N m')}"] if "late_torque" in n else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
     bounds[-1] += " of the inertia as given" * ("momentum" in n and "tolerance" in n)

@@ -165,14 +165,17 @@ def assumptions(certificate: Certificate) -> str:
     return "; ".join(parts)
 
 
-def print_compared(others: Sequence[str], scenario: str | None) -> None:
-    """Print whether the proofs are about the loops of a scenario; None: they were not compared."""
+def print_compared(others: Sequence[str], beside: Sequence[str], scenario: str | None) -> None:
+    """Print whether the proofs are about the loops of a scenario, and what they leave open about these; None: they were not
+    compared."""
     if scenario is None:
         console.print("The programs of its proofs were not compared with those of a scenario.")
     elif not others:
         console.print(f"The programs of its proofs are those of {_safe(scenario)}.")
     for text in others:
         console.print(f"[red]another loop[/red]  {_safe(text)}")
+    for text in beside:
+        console.print(f"[yellow]left open[/yellow]  {_safe(text)}", soft_wrap=True)
 
 
 def print_findings(findings: Sequence[Finding]) -> None:

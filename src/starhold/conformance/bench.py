@@ -1,13 +1,14 @@
 """The spacecraft, states and loops with which laws are examined."""
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from starhold.algebra.quaternion import NO_TURN, Quaternion
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
 from starhold.algebra.structure import unflatten
-from starhold.algebra.vector import ZERO, Vector
+from starhold.algebra.vector import ZERO, Vector, add, norm, scale
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -61,3 +62,26 @@ def sample_loop(law: Law, gains: Any) -> ClosedLoop:
 def call(law: Law, measurement: Measurement, gains: Any, craft: Craft = CRAFT) -> Vector:
     """Return the torque of a law called once, with its initial memory."""
     return law.command(measurement, gains, craft, law.remember(gains, craft, measurement.period))[0]
+
+
+def anywhere(loop: ClosedLoop, random: np.random.Generator) -> Iterator[tuple[Any, float, float]]:
+    """Yield states of a rigid body at any attitudes and rates, and two zeros."""
+    while True:
+        turned = random.normal(size=4)
+        attitude, rate = (tuple(x.tolist()) for x in (turned / np.linalg.norm(turned), random.normal(size=3)))
+        yield loop.start._replace(attitude=attitude, rate=rate), 0.0, 0.0
+
+
+def moving(loop: ClosedLoop, random: np.random.Generator) -> Iterator[tuple[Any, float, float]]:
+    """Yield states of a rigid body that accelerates anyhow, with its largest rate and acceleration so far: errors that grow
+    with these have bounds there."""
+    state, fast, hurried = loop.start, norm(loop.start.rate), 0.0
+    while True:
+        yield state, fast, hurried
+        change: Any = tuple(random.normal(size=3).tolist())
+        rate = add(state.rate, scale(loop.period, change))
+        turn = scale(0.25 * loop.period, add(rate, state.rate))
+        half = norm(turn)
+        onward = (math.cos(half), *scale(math.sin(half) / half if half else 1.0, turn))
+        state = state._replace(rate=rate, attitude=normalise(multiply(state.attitude, onward)))
+        fast, hurried = max(fast, norm(rate)), max(hurried, norm(change))

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from math import inf
 from pathlib import Path
 from typing import Any, cast
@@ -11,9 +12,10 @@ import numpy as np
 from starhold.algebra.quaternion import NO_TURN, conjugate, multiply, normalise, to_reference, vector_part
 from starhold.algebra.structure import flatten, leaves
 from starhold.algebra.vector import ZERO, Vector, add, apply, norm, scale, subtract
+from starhold.certification.measured import bounded
 from starhold.certification.target_motion import motion_of
 from starhold.certification.unmodelled import COMMANDED, envelope_of
-from starhold.conformance.bench import PERIOD, sample_loop
+from starhold.conformance.bench import PERIOD, anywhere, moving, sample_loop
 from starhold.conformance.units import SYSTEMS, rescale, rescale_params
 from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, find, require, run
 from starhold.errors import InputError
@@ -220,27 +222,24 @@ def keeps_what_it_says(part: Part) -> None:
     if part.hook("late") is not None:
         _follows_as_it_says(part)
         return
-    tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
     # A body has an equation of this name.
-    tell_motion = part.hook("motion") if part.role == "target" else None
-    if all(tell is None for tell in (tell_torque, tell_errors, tell_motion, tell_change)):
-        raise NotApplicableError("it says no bound of its torque, of its errors or of its motion")
-    if tell_motion is not None:
+    if part.role == "target" and part.hook("motion") is not None:
         _moves_as_it_says(part)
         return
+    tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
+    if all(tell is None for tell in (tell_torque, tell_errors, tell_change)):
+        raise NotApplicableError("it says no bound of its torque, of its errors or of its motion")
     for params in part.examples():
         loop = loop_with(part, params)
         # In a few steps external torques contribute little momentum.
         envelope = envelope_of(loop, 1.01 * norm(_momentum(loop, loop.carry())), noisy=True)
-        errors, torque, command, change = UNBOUNDED, Push(inf), Push(inf), Push(inf)
+        errors, command = UNBOUNDED, Push(inf)
         if tell_errors and part.role in COMMANDED:
             command = tell_errors(params, envelope)
         elif tell_errors:
-            errors = tell_errors(params)
-        if tell_torque:
-            torque = tell_torque(params, envelope)
-        if tell_change:
-            change = tell_change(params, loop.craft, envelope)
+            errors = bounded(next(f for f in loop.parts if f.part == part), loop.period) or UNBOUNDED
+        torque = tell_torque(params, envelope) if tell_torque else Push(inf)
+        change = tell_change(params, loop.craft, envelope) if tell_change else Push(inf)
         limits = (*errors, *torque, *command, *change)
         require(min(limits) >= 0.0, f"the bounds {limits} are not all positive or 0")
         pushed = _pushes(part, loop, errors, torque, command)
@@ -325,11 +324,8 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
         return push.torque + push.per_rate * norm(state.rate)
 
     memory = fitted.remembered(numbers, *([loop.start] if part.role == "sensor" else []))
-    for step in range(STEPS):
-        turned = random.normal(size=4)
-        state = loop.start._replace(
-            attitude=tuple((turned / np.linalg.norm(turned)).tolist()), rate=tuple(random.normal(size=3).tolist())
-        )
+    states = (moving if errors.grow else anywhere)(loop, random)
+    for step, (state, fast, hurried) in enumerate(islice(states, STEPS)):
         if part.role == "environment":
             memory = module.update(memory, state, numbers, dice, step) if part.hook("update") else memory
             yield "torque", norm(module.torque(state, numbers, loop.craft, memory)), most(torque, state)
@@ -338,9 +334,13 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
             if hasattr(reading, "attitude"):
                 # The angle, for either sign of the quaternion.
                 turn = 2.0 * norm(vector_part(multiply(conjugate(state.attitude), reading.attitude)))
-                yield "error of the attitude", turn, errors.attitude
+                yield "error of the attitude", turn, errors.attitude + errors.turning * fast
             if hasattr(reading, "rate"):
-                yield "error of the rate", norm(subtract(reading.rate, state.rate)), errors.rate
+                yield (
+                    "error of the rate",
+                    norm(subtract(reading.rate, state.rate)),
+                    errors.rate + errors.turned * fast + errors.late * hurried,
+                )
         elif part.role == "actuator" and part.hook("command"):
             torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
             yield (

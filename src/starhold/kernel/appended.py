@@ -12,16 +12,19 @@ from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate
+from operator import mul
 from typing import NamedTuple
 
 from .loops import AXES, IS_VALID, AttitudeLoop
-from .numbers import Rows, added, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
-from .taylor import Model, add, beyond, multiply, negative, number, run, slope, within
+from .numbers import Account, Rows, added, demand, inverse, norm, plus, reach, root, scalar, shortened, times, transpose, up
+from .regions import stretch
+from .taylor import PLACES, Model, add, beyond, multiple, multiply, negative, number, run, slope, within
 from .taylor import root as root_of
 
-MOST, LONGEST, FINE, TINY, LITTLE = 40, 16, 2**64, Fraction(1, 2**20), Fraction(1, 2**200)
+MOST, LONGEST, FINE, TINY, LITTLE, SHORT = 40, 16, 2**64, Fraction(1, 2**20), Fraction(1, 2**200), 48
 """How many states appendages may have; how far the motion of a period may be; the share of it at which a series ends; the
-size of inputs of which slopes at zero are read; the least number of a matrix of bounds that is not zero."""
+size of inputs of which slopes at zero are read; the least number of a matrix of bounds that is not zero; the places of
+slopes."""
 HALF, ZERO = Fraction(1, 2), Fraction(0)
 Column = list[Fraction]
 
@@ -46,7 +49,9 @@ class Left(NamedTuple):
 
 class Period(NamedTuple):
     """Samples with |y_k| <= r_k are followed by ones with |y| <= grown r + more, the states until then are at
-    most between r + far, torques with all errors torque r + pushed, and the command torque r + commanded."""
+    most between r + far, torques with all errors torque r + pushed, and the command torque r + commanded, of which
+    law r + law_rest is what is not linear in what is told. Rates differ from the linear ones by `over` at most; torques from
+    outside are no more than `outside`, and errors of the command and of what is told no more than `error`."""
 
     grown: Rows
     more: Column
@@ -55,6 +60,11 @@ class Period(NamedTuple):
     torque: Rows
     pushed: Column
     commanded: Column
+    law: Rows
+    law_rest: Column
+    over: Column
+    outside: Fraction
+    error: Fraction
 
 
 class Appended:
@@ -73,9 +83,10 @@ class Appended:
         A = [row[: self.n] for row in slopes]
         turning = [[HALF * (i == k) for k in range(self.n)] for i in AXES]
         B, none = [row[self.n :] for row in slopes], [[ZERO] * 3] * 3
-        self.A, self.B = [*A[:3], *turning, *A[3:]], [*B[:3], *none, *B[3:]]
+        # All that follows holds of any A, B and K.
+        self.A, self.B = (shortened(x, SHORT) for x in ([*A[:3], *turning, *A[3:]], [*B[:3], *none, *B[3:]]))
         # The law's torque is -Kz near rest.
-        self.K = [[-slope(x, TINY, k) for k in range(self.n)] for x in self.command(small)]
+        self.K = shortened([[-slope(x, TINY, k) for k in range(self.n)] for x in self.command(small)], SHORT)
 
     def rates(self, state: Column, torque: Column) -> list[Model]:
         """Return models of w' and v' where states and torques are no larger than told."""
@@ -142,28 +153,47 @@ class Appended:
         terms, last, top = 0, a / 2, 3 ** -(-a.numerator // a.denominator)
         while last * top * FINE > 1:
             terms, last = terms + 1, last * a / (terms + 3)
-        self.tail = up(h * last * top)
-        forward, power, share = plus(times(A, V), times(self.B, KV), -1), scalar(1, self.n), h
+        # Of the terms (Ah)^m/m! each entry is rounded down, which takes none further off than by this times e^a.
+        places = PLACES + top.bit_length()
+        self.tail = up(h * top * (last + Fraction(self.n * (terms + 1), 1 << places)))
+        self.pull = plus(A, times(self.B, self.K), -1)[:3]
+        forward, power = plus(times(A, V), times(self.B, KV), -1), scalar(1, self.n)
         end, held_torque, spans = V, [[ZERO] * 3 for _ in A], sized(V, alone, blocks)
         given, carry, filtered = held_torque, [[ZERO] * self.n for _ in A], [[ZERO] * self.n for _ in blocks]
-        self.start = short(spans)
+        nudged, bent, struck, middle = [ZERO] * self.n, [ZERO] * self.n, [ZERO] * len(blocks), held_torque
+        self.start, hurry = short(spans), sized([[ZERO] * self.n] * 3, axes, blocks)
         for m in range(terms + 1):
-            moved, pushed = times(power, forward), times(power, self.B)
+            share, moved, pushed = h / (m + 1), times(power, forward), times(power, self.B)
             end, held_torque = plus(end, moved, share), plus(held_torque, pushed, share)
             spans, given = plus(spans, sized(moved, alone, blocks), share), plus(given, sizes_of(pushed), share)
             carry = plus(carry, sizes_of(power), share)
             filtered = plus(filtered, sized(times(W, power), blocks, alone), share)
-            power, share = times(A, power), share * h / (m + 2)
+            # Torques from outside come from any side, and turn over at any time.
+            lengths, turned = list(map(norm, pushed)), parted(times(W, pushed), blocks)
+            nudged = [x + share * y for x, y in zip(nudged, lengths, strict=True)]
+            # A curve is h^2/8 of its second derivative from a line, which is near that in the middle of the period.
+            curve, in_middle = h * (m * (m - 1)) / 12, Fraction(4, 2**m)
+            bent = [x + curve * (1 - in_middle) * y for x, y in zip(bent, lengths, strict=True)]
+            middle = plus(middle, pushed, curve * in_middle)
+            struck = [x + share * norm(y for row in rows for y in row) for x, rows in zip(struck, turned, strict=True)]
+            hurry = plus(hurry, sized(times(A[:3], moved), axes, blocks), share)
+            power = shortened([[share * x for x in row] for row in times(A, power)], places)
         # A block of two is no longer than 3/2 times the larger one of its components.
         largest = [max(map(total, rows)) for rows in parted(W, blocks)]
         self.widths = [up(x * (size + 1) / 2) for x, size in zip(largest, blocks, strict=True)]
         self.filter = short([[x + self.tail * width for x in row] for row, width in zip(filtered, self.widths, strict=True)])
         self.carry = short([[x + self.tail for x in row] for row in carry])
-        self.linear, self.held_torque = (
-            short(sized(times(W, end), blocks, blocks)),
-            short(sized(times(W, held_torque), blocks, axes)),
-        )
+        whole_period, self.linear = held_torque, short(sized(times(W, end), blocks, blocks))
+        self.held_torque = short(sized(times(W, held_torque), blocks, axes))
         self.spans, self.given, self.feedback = short(spans), short(given), short(sized(KV, axes, blocks))
+        rest = self.tail * max(map(norm, self.B))
+        self.nudged, self.struck = combined(nudged, [rest] * self.n), combined(struck, [rest * x for x in self.widths])
+        rest *= a / 2 + Fraction((terms + 2) * (terms + 1) * terms, 12)
+        self.bent, self.hurry = combined(bent, [rest] * self.n), short(hurry)
+        final = plus(self.B, times(A, whole_period))
+        ends = ([[h / 2 * x for x in row] for row in rows] for rows in (self.B, final))
+        self.ways = [shortened(rows, PLACES) for rows in (*ends, middle, whole_period)]
+        self.sampled = shortened(times(end, W), PLACES)
 
     def begun(self, X: Rows, appendages: Column) -> Column:
         """Return bounds of the blocks where (w, q) is in the ellipsoid of X, and appendages are no further than told."""
@@ -182,22 +212,42 @@ class Appended:
         left = self.left(box)
         error, outside = (self.push(name, box.state) for name in ("error", "outside"))
         # The law's torque is -Kz, and beside no more than law r + rest, as it is told a state that is off.
-        law = times(left.law, self.start)
-        off = plus(sizes_of(self.K), left.law)
-        commanded = combined(left.law_rest, image(off, self.misread))
+        law, law_rest = times(left.law, self.start), combined(left.law_rest, image(left.law, self.misread))
+        commanded = combined(law_rest, image(sizes_of(self.K), self.misread))
         rest = combined(commanded, [error] * 3)
         torque, pushed = short(plus(self.feedback, law)), combined(rest, [outside] * 3)
-        # What moves the state beside the linear motion from the sample on: what is left, and torques from outside.
-        steady = combined(left.rest, image(sizes_of(self.B), [outside] * 3))
-        over = combined(steady, image(left.state, box.state), image(left.torque, box.torque))
-        tail = self.tail * max(combined(image(sizes_of(self.A), box.state), image(sizes_of(self.B), box.torque)))
+        # What moves the state beside the linear motion and torques from outside from the sample on.
+        over = combined(left.rest, image(left.state, box.state), image(left.torque, box.torque))
+        tail = self.unseries(box)
         between = short(plus(self.spans, times(self.given, law)))
-        far = combined(image(self.given, rest), image(self.carry, over), [tail] * self.n)
+        shaken = [outside * x for x in self.nudged]
+        far = combined(image(self.given, rest), image(self.carry, over), shaken, [tail] * self.n)
         inner = plus(times(left.state, between), times(left.torque, torque))
-        beside = combined(steady, image(left.state, far), image(left.torque, pushed))
+        beside = combined(left.rest, image(left.state, far), image(left.torque, pushed))
         grown = short(plus(plus(self.linear, times(self.held_torque, law)), times(self.filter, inner)))
-        more = combined(image(self.held_torque, rest), image(self.filter, beside), [tail * width for width in self.widths])
-        return Period(grown, more, between, far, torque, pushed, commanded)
+        shaken = [tail * width + outside * x for width, x in zip(self.widths, self.struck, strict=True)]
+        more = combined(image(self.held_torque, rest), image(self.filter, beside), shaken)
+        rate, turn = ([row[part] for row in self.K] for part in (slice(3), slice(3, 6)))
+        error += stretch(rate) * self.misread[0] + stretch(turn) * self.misread[3]
+        return Period(grown, more, between, far, torque, pushed, commanded, law, law_rest, over, outside, error)
+
+    def unseries(self, box: Box) -> Fraction:
+        """Return how far what is left of the series may take each component of a state in a period."""
+        return self.tail * max(combined(image(sizes_of(self.A), box.state), image(sizes_of(self.B), box.torque)))
+
+    def beside(self, period: Period, box: Box, wrong: Fraction) -> Column:
+        """Return what a period at most adds to what `sampled` makes of samples, and `ways` of torques from outside and of
+        torques that are held, of up to `wrong`."""
+        rounded = added([*box.state, 9 * period.outside, 3 * wrong]) / 2**PLACES
+        shaken = [period.outside * x + self.unseries(box) + rounded for x in self.bent]
+        return combined(image(self.carry, period.over), shaken)
+
+    def hurried(self, period: Period, box: Box, radii: Column, wrong: Fraction) -> Fraction:
+        """Return a bound of how far w' is at all times from what is linear in the last sample."""
+        moved = combined(image(self.given, [wrong] * 3), image(self.carry, period.over))
+        moved = [x + period.outside * y + self.unseries(box) for x, y in zip(moved, self.nudged, strict=True)]
+        torques = [(wrong + period.outside) * norm(row) for row in self.B[:3]]
+        return norm(combined(image(self.hurry, radii), image(sizes_of(self.A[:3]), moved), torques, period.over[:3]))
 
 
 def image(rows: Rows, v: Column) -> Column:
@@ -247,12 +297,19 @@ def longer(block: Rows) -> Fraction:
 
 
 def follow(period: Period, begun: Column, periods: int) -> tuple[Column, Column]:
-    """Return bounds of samples at the start of each of so many periods, the first of which is told, and after them."""
-    largest = begun
+    """Return bounds of samples at the start of each of so many periods, the first of which is told, and after them. They are
+    in whole multiples, rounded up."""
+    rows, (now, more) = (
+        [list(map(multiple, row)) for row in period.grown],
+        (list(map(multiple, x)) for x in (begun, period.more)),
+    )
+    largest = now
     for k in range(periods):
-        largest = list(map(max, largest, begun)) if k else largest
-        begun = combined(image(period.grown, begun), period.more)
-    return largest, begun
+        Account.spend(len(now) ** 2 // 4, 2 * PLACES)
+        largest = list(map(max, largest, now)) if k else largest
+        now = [x - (-sum(map(mul, row, now)) >> PLACES) for row, x in zip(rows, more, strict=True)]
+    most, last = ([Fraction(x, 1 << PLACES) for x in column] for column in (largest, now))
+    return most, last
 
 
 def after(period: Period, begun: Column, periods: int) -> Column:

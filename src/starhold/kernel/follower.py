@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -118,12 +117,21 @@ class Follower(Reader):
     leaning: list[Poly]
     apart: Radii
     swayed: Radii
+    leant: Radii
     late: Late | None
 
+    def sways(self, radii: list[Fraction]) -> None:
+        """Take in what noise adds near the target: rate, turn and the torque that acts, if it lags, and then what momentum
+        makes of these."""
+        count = len(self.near.A) // 3
+        (w, q, *torque), (faster, farther, *more) = radii[:count], radii[count:] or [ZERO] * count
+        self.swayed, self.apart = (w, q), (faster, farther)
+        self.drawn = (torque[0], more[0]) if torque else AT_REST
+
     @property
-    @abstractmethod
     def away(self) -> Radii:
         """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
+        return self.swayed[0] + self.leant[0], self.swayed[1] + self.leant[1]
 
     def follow(self, numbers: Numbers) -> Late | None:
         """Read how late the torque is, if it is."""
@@ -253,6 +261,15 @@ class Follower(Reader):
             return ZERO
         changed = norm(tube.end) / (1 - self.late.kept) + 2 * self.swayed[0]
         return felt(self.heeded, "w", tube.sizes) * (min(2 * fast, changed) + 2 * self.apart[0])
+
+    def spun_on(self, tube: Tube, spun: Fraction, fast: Fraction) -> Fraction:
+        """Return a bound of the torque, in the mean of a period, by which the drift of the rates is not that of the linear
+        motion, because what momentum and a rate ask for acts late: A has of this what acts, and samples have all of it.
+        spun: what `spun_late` returns."""
+        if not (self.inexact and self.late):
+            return ZERO
+        rate = self.swayed[0] if fast else tube.region.sizes[SPEED]
+        return self.late.mean * (spun + felt(self.heeded, "w", tube.sizes) * rate)
 
     def paced(self, tube: Tube, pulled: Fraction, torque: Fraction | None = None) -> Fraction:
         """Return how large the acceleration is in the mean of a period, of a linear motion for which as much is asked as

@@ -8,6 +8,7 @@ Docs/kernel.md, 10.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -18,6 +19,7 @@ from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus,
 from .plans import PLANNED, Plan
 from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
 from .regions import (
+    AMISS,
     ANGLE,
     AT_REST,
     LOAD,
@@ -47,6 +49,8 @@ from .regions import (
 )  # fmt: skip
 
 WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
+NEARER = Fraction(17, 16)
+"""How near to what they come down to errors are counted that grow with the motion."""
 
 
 class Held(Follower):
@@ -66,6 +70,11 @@ class Held(Follower):
             [numbers.get(f"{kind}.{name}") or Fraction(0) for name in ("attitude", "rate")] for kind in ("noise", "error")
         )
         self.turned, self.rated = (x + y for x, y in zip(self.noise, errors, strict=True))
+        # How much more what is told is off for each unit of rate and acceleration, since when, and what is kept of more.
+        of = ("rate", "acceleration")
+        self.moving = [[numbers.get(f"error.{name}.per.{x}") or ZERO for x in of] for name in ("attitude", "rate")]
+        self.ago, self.held_back = (numbers.get(f"error.{name}") or ZERO for name in ("ago", "kept"))
+        demand(self.held_back < 1, "errors are not forgotten")
         self.off = loop.off if "tolerance" in numbers else ZERO
         self.led, self.hurried = (numbers.get(f"error.target.{name}") or Fraction(0) for name in ("rate", "acceleration"))
         demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
@@ -192,7 +201,7 @@ class Held(Follower):
 
     def planned(self, sizes: Sizes) -> Fraction:
         """Return how far the torque is at most from that of a plan's moves, if there is one."""
-        return self.plan.error(as_told(sizes, self.wrong)) if self.plan else ZERO
+        return self.plan.error(as_told(sizes, self.wrong(sizes))) if self.plan else ZERO
 
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
@@ -205,8 +214,9 @@ class Held(Follower):
         speeds = dict.fromkeys(("q0", *STATE[TURN]), w / 2) | dict.fromkeys(MOMENTA, w * self.size("h"))
         return speeds | {x: sizes[f"u{k + 1}"] + most(self.bend[k], sizes) for k, x in enumerate(STATE[RATE])}
 
-    def tube(self, region: Region) -> Tube:
-        """Return what motions stay in for a period."""
+    def tube(self, region: Region, amiss: list[Fraction] | None = None) -> Tube:
+        """Return what motions stay in for a period. amiss: how much more attitude and rate are off that the law is told as
+        the body moves, by default a little more than after a motion that did not leave the tube."""
         sizes = region.sizes
         near = sizes | {"v": 1 - region.least}
         # In an ellipsoid c.x is no more than the root of c.Xc.
@@ -214,30 +224,43 @@ class Held(Follower):
         even = [min(x, sizes.get(PULL, x)) for x in even]
         odd = [most(p, near) for p in self.odd]
         asks = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
-        begun = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
-        steady, uneven = self.misread(region)
+        pulled = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
         rigid = sum((felt(within_tube, x, sizes) * self.size(x) for x, within_tube in self.rigid.items()), Fraction(0))
-        steady, uneven, late = steady + rigid + self.lasting, uneven + rigid + self.lasting, self.behind(sizes)
+        rigid, late = rigid + self.lasting, self.behind(sizes)
 
-        def within(wide: list[Fraction], load: Fraction) -> Sizes:
-            return sizes | named(STATE[RATE], wide) | {SPEED: sizes[SPEED] + norm(beyond(wide, sizes)), LOAD: load}
+        def within(bounds: list[Fraction]) -> Sizes:
+            (*wide, load), off = bounds[:4], bounds[4:]
+            more = {SPEED: sizes[SPEED] + norm(beyond(wide, sizes)), LOAD: load}
+            return sizes | named(STATE[RATE], wide) | more | named(AMISS, off)
+
+        def misread(bounds: list[Fraction]) -> tuple[Region, list[Fraction]]:
+            where = replace(region, sizes=sizes | named(AMISS, bounds[4:]))
+            steady = [x + rigid for x in self.misread(where)]
+            return where, list(map(up, steady)) if self.grows else steady
+
+        begun, bound = amiss or [ZERO, ZERO], amiss or not self.grows
+        read = misread([ZERO] * 4 + begun)
 
         def reached(bounds: list[Fraction]) -> list[Fraction]:
-            *wide, load = bounds
-            within_tube = within(wide, load)
+            within_tube, wide = within(bounds), bounds[:3]
+            steady = (read if bound else misread(bounds))[1][0]
             stale = self.stale(within_tube, self.beside)
             push = steady + self.pushed(within_tube)["both"] + stale + late.mean
             slopes = [[most(p.slope(name), within_tube) for name in STATE[RATE]] for p in self.bend]
-            columns = zip(begun, reach(slopes, beyond(wide, sizes)), self.widths, strict=True)
+            columns = zip(pulled, reach(slopes, beyond(wide, sizes)), self.widths, strict=True)
             faster = [u + more + push * n for u, more, n in columns]
             wide = [sizes[x] + self.h * more for x, more in zip(STATE[RATE], faster, strict=True)]
-            return [*wide, self.load(within_tube, norm(faster) + (stale + late.most - late.mean) * self.light)]
+            fastest = norm(faster) + (stale + late.most - late.mean) * self.light
+            off = begun if bound else [NEARER * x for x in self.misleads(within_tube, fastest)]
+            return [*wide, self.load(within_tube, fastest), *off]
 
-        *wide, load = settled(reached, [*(sizes[name] for name in STATE[RATE]), ZERO])
-        far = within(wide, load)
+        bounds = settled(reached, [*(sizes[name] for name in STATE[RATE]), ZERO, *begun])
+        region, (steady, uneven) = misread(bounds) if self.grows else (region, read[1])
+        far, wide = within(bounds), bounds[:3]
         turned = self.h / 2 * far[SPEED]
         far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | asks
         demand(not self.even or region.least > turned, "motions pass a half turn")
+        demand(not self.grows or turned < 1, "the body turns too far in a period")
         pushed, stale = self.pushed(far)["both"], self.stale(far, self.beside)
         bent = [[most(p.slope(name), far) for name in STATE[RATE]] for p in self.bend]
         end = beyond(wide, sizes)
@@ -326,19 +349,6 @@ class Held(Follower):
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
         return between(self.near, self.loop, self.size("h")) if self.loop.wheels else [self.near.A]
 
-    def sways(self, radii: list[Fraction]) -> None:
-        """Take in what noise adds near the target: rate, turn and the torque that acts, if it lags, and then what momentum
-        makes of these."""
-        count = len(self.near.A) // 3
-        (w, q, *torque), (faster, farther, *more) = radii[:count], radii[count:] or [ZERO] * count
-        self.swayed, self.apart = (w, q), (faster, farther)
-        self.drawn = (torque[0], more[0]) if torque else AT_REST
-
-    @property
-    def away(self) -> Radii:
-        """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
-        return self.swayed[0] + self.leant[0], self.swayed[1] + self.leant[1]
-
     def pulled(self, radii: Radii) -> Fraction:
         """Return a bound of the acceleration that is linear in a motion with these |w| and |q|."""
         rows = self.near.rates
@@ -355,12 +365,14 @@ class Held(Follower):
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         near = region.sizes | {"v": turn * turn}
         odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
-        odd += self.spun_late(tube, fast)
+        spun = self.spun_late(tube, fast)
+        odd += spun
         # What noise adds has in it what momentum makes of it, but not what it makes of that.
         noisy = felt(self.heeded, "w", near) * self.noise[1] * self.light
         at_ends, along, uneven = self.ends(tube)
         drift = norm(self.astray(tube, self.lasting + tube.steady - tube.uneven + tube.late.moved - uneven))
         drift += h * (self.paced(tube, pulled) + self.paced(tube, self.pulled(self.apart), self.drawn[1]) + noisy)
+        drift += h * self.light * self.spun_on(tube, spun, fast)
         growing = "rh" + "e" * (self.gradual(tube.sizes) < 2 * self.size("e"))
         late = self.stale(tube.sizes, self.beside, letters=growing)
         steady = tube.uneven - self.lasting + tube.pushed - self.random + odd + tube.stale - late

@@ -9,9 +9,9 @@ from fractions import Fraction
 from functools import cached_property
 
 from .loops import AttitudeLoop
-from .numbers import norm, root
+from .numbers import Rows, norm, reach, root
 from .polynomials import Poly
-from .regions import ANGLE, SPEED, Region, Sizes, as_told, felt, stretch
+from .regions import AMISS, ANGLE, AT_REST, SPEED, Radii, Region, Sizes, Tube, as_told, felt, stretch
 
 ZERO = Fraction(0)
 
@@ -24,42 +24,65 @@ class Reader(ABC):
     noise: list[Fraction]
     turned: Fraction
     rated: Fraction
+    moving: Rows
     led: Fraction
     hurried: Fraction
     change: list[Fraction] | None
     unlike: list[Poly]
     h: Fraction
     off: Fraction
+    light: Fraction
 
     @abstractmethod
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
 
     @cached_property
-    def wrong(self) -> Sizes:
+    def grows(self) -> bool:
+        """Whether errors of what the law is told grow with the motion."""
+        return any(map(any, self.moving))
+
+    def misled(self, sizes: Sizes) -> Radii:
+        """Return how far off attitude and rate are that the law is told; in a tube, where that grows with the motion."""
+        more = [sizes[x] for x in AMISS] if self.grows else AT_REST
+        return self.turned + more[0], self.rated + more[1]
+
+    def misleads(self, sizes: Sizes, acceleration: Fraction) -> list[Fraction]:
+        """Return how much of that comes of a motion with these rates, relative to the target, and this acceleration."""
+        w, r = sizes[SPEED], self.size("r")
+        return reach(self.moving, [w + r, acceleration + self.size("a") + w * r])
+
+    def misleading(self, tube: Tube) -> list[Fraction]:
+        """Return how much more attitude and rate are off at most that the law is told, after a motion in a tube."""
+        fastest = norm(tube.end) / self.h + (tube.stale + tube.late.most - tube.late.mean) * self.light
+        return self.misleads(tube.sizes, fastest)
+
+    def wrong(self, sizes: Sizes) -> Sizes:
         """Return how far off what the law is told is at most, by its letters."""
-        r, a = self.size("r"), self.size("a")
-        turn = {"r": self.led + self.turned * r, "a": self.hurried + self.turned * a}
+        (turned, rated), r, a = self.misled(sizes), self.size("r"), self.size("a")
+        turn = {"r": self.led + turned * r, "a": self.hurried + turned * a}
         # A torque that turns over at once is what the law is told.
-        changed = self.change[1] * self.turned if self.change else Fraction(0)
-        spun = stretch(self.loop.given) * self.rated
-        return {"q": self.turned / 2, "w": self.rated + turn["r"], "h": spun, "e": changed} | turn
+        changed = self.change[1] * turned if self.change else Fraction(0)
+        return {"q": turned / 2, "w": rated + turn["r"], "h": stretch(self.loop.given) * rated, "e": changed} | turn
 
     def misread(self, region: Region) -> tuple[Fraction, Fraction]:
         """Return how far the torque is from what the law asks for at the true state, for errors of what it is told; and how
         far from there and what errors that noise drives add linearly on target."""
-        if not self.turned + self.rated + self.led + self.hurried:
+        if not (self.turned + self.rated + self.led + self.hurried or self.grows):
             return Fraction(0), Fraction(0)
-        wrong, sizes = self.wrong, as_told(region.sizes, self.wrong)
+        wrong = self.wrong(region.sizes)
+        sizes = as_told(region.sizes, wrong)
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
         all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
         away, (turned, rated) = sizes[ANGLE], self.noise
         near = sizes | {"v": away * away}
         linear = {"q": turned / 2, "w": rated}
-        curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
+        # Other errors turn it too.
+        apart = (self.misled(region.sizes)[0] - turned) * turned / 2
+        curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8 + apart, "w": Fraction(0)}
         less = [(full[k] - felt(self.unlike, k, near)) * x - full[k] * curved[k] for k, x in linear.items()]
-        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2)
+        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.misled(region.sizes)[0] / 2)
 
     def size(self, letter: str) -> Fraction:
         """Return a bound of the norm of a vector from outside."""

@@ -13,10 +13,14 @@ from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, time
 from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
+FAR = 1 << 100
+"""What bounds that settle do not exceed."""
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
 SPEED, ANGLE, PULL, LOAD = "|w", "|q", "|u", "|j"
 """Under which the sizes have those of |w| and |q|, of the acceleration that is linear in the state where it is known, and in
 a tube of the torque that an inertia near the given one adds."""
+AMISS = "|turn", "|rate"
+"""Under which those of a tube have how much more the told attitude and rate are off as the body moves."""
 TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]
 """The matrix of (x, y, z) × has x, y and z in these places with these signs: the permutation symbol."""
 Sizes = dict[str, Fraction]
@@ -219,4 +223,6 @@ def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Frac
         if all(x <= y for x, y in zip(further, bounds, strict=True)):
             return bounds
         bounds = [up(x + x / 2**20) for x in further]
+        if max(bounds) > FAR:
+            break
     raise RefusedError("the period is too long for the rates")

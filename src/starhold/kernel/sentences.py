@@ -26,6 +26,7 @@ ASSUMPTIONS = {
     "held-torque": "the torque is what the law asks for at the last sample, and the error",
     "late-torque": "the torque that acts is off by e, which nears 0 in a period, and then changes with what is asked for",
     "late-alike": "all components of e near 0 alike, and no faster than told",
+    "late-told": "errors of what the law is told are no larger at the start than if the body had moved so before",
     "best-plan": "the law's torque is of a plan as told, for the given inertia and motion linearised about the rate told",
     "gaussian-noise": "noise is Gaussian, and independent from sample to sample",
     "linear-estimate": "noise drives errors of what the law is told linearly, as for the target's rate at the start",

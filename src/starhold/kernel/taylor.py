@@ -88,6 +88,9 @@ def subtract(x: Model, y: Model) -> Model:
 
 def multiply(x: Model, y: Model) -> Model:
     """Return a product, without what is of a higher degree."""
+    for a, b in ((x, y), (y, x)):
+        if not a.radius and not any(a.parts[1:]):
+            return multiplied(b, a.constant)
     parts, left, right, rounded = list[Terms](), x.sizes, y.sizes, 0
     for degree in range(DEGREE + 1):
         product = dict[int, int]()
@@ -101,6 +104,14 @@ def multiply(x: Model, y: Model) -> Model:
     higher = sum(a * b for i, a in enumerate(left) for k, b in enumerate(right) if i + k > DEGREE)
     apart = higher + x.radius * (sum(right) + y.radius) + sum(left) * y.radius
     return Model(tuple(parts), -(-apart >> PLACES) + rounded)
+
+
+def multiplied(x: Model, c: int) -> Model:
+    """Return a model times so many multiples."""
+    products = [{m: c * d for m, d in part.items()} if c else {} for part in x.parts]
+    rounded = sum(d & (ONE - 1) > 0 for part in products for d in part.values())
+    parts = tuple({m: d >> PLACES for m, d in part.items()} for part in products)
+    return Model(parts, -(-abs(c) * x.radius >> PLACES) + rounded)
 
 
 def series(x: Model, coefficients: Sequence[Fraction], rest: Fraction) -> Model:

@@ -141,6 +141,13 @@ def late_by(delay: float, period: float, jitter: float = 0.0) -> Late:
     return late if any(late) else ()
 
 
+def behind(delay: float) -> float:
+    """Return how far back (s) the motion counts in proportion to which a delayed reading has errors.
+    An attitude that is interpolated may be further back than in proportion to time: by less than a fortieth, where the body
+    turns by no more than 2 rad in a period."""
+    return 1.025 * delay
+
+
 def awaited(sensor: Any, late: Late, state: Any, names: Sequence[str]) -> Any:
     """Return the initial memory of a delayed sensor, with the sensor's own: before the start these fields were constant."""
     count = late.periods + bool(late.share or late.jitter) if late else 0

@@ -44,12 +44,24 @@ class NoParams(NamedTuple):
 class Errors(NamedTuple):
     """Bounds on the norms of a sensor's errors besides noise: of the attitude (rad), the rate (rad/s) and the magnetic
     field (T); `inf` for no bound. `bias`: the part of the rate's error that is constant in body axes (rad/s), the only
-    error that a filter removes."""
+    error that a filter removes. Beside them errors may grow with the motion: `turning`, of the attitude with the body's
+    rate (s); `turned`, of the rate with that (1); and `late`, of the rate with the body's acceleration (s). They are those
+    of the last `ago` seconds, in the state of which before the start nothing changed, on a body that turns by no more
+    than 2 rad in a control period."""
 
     attitude: float = 0.0
     rate: float = 0.0
     field: float = 0.0
     bias: float = 0.0
+    turning: float = 0.0
+    turned: float = 0.0
+    late: float = 0.0
+    ago: float = 0.0
+
+    @property
+    def grow(self) -> bool:
+        """Whether they grow with the motion."""
+        return max(self.turning, self.turned, self.late) > 0.0
 
 
 NO_ERRORS, UNBOUNDED = Errors(), Errors(math.inf, math.inf, math.inf)
@@ -88,6 +100,8 @@ class Recursion(NamedTuple):
     """Number of vectors of errors."""
     noises: int = 3
     """Number of vectors of noise."""
+    lag: float = 0.0
+    """How much of the body's acceleration (s) is at most an error of the rate that counts until the next step."""
 
 
 class Envelope(NamedTuple):
@@ -150,12 +164,14 @@ class Late(NamedTuple):
     """How what a part gives is late, in a loop of one control period. Let e be the command less what acts. In a period |e|
     does not grow, is no more than `mean` times its first value in the mean, and `kept` times that in the end; then it
     changes by as much as the command. All this while no component of e exceeds `most`. moment: of what is linear, so that e
-    keeps its direction and these shares are exact, the mean in which it counts by the share of the period that is left."""
+    keeps its direction and these shares are exact, the mean in which it counts by the share of the period that is left.
+    least: these three at least, which flights do not follow exactly."""
 
     kept: float
     mean: float
     most: float = math.inf
     moment: float | None = None
+    least: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,12 @@ from datetime import date, time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
 
+from starhold.algebra.quaternion import normalise
+from starhold.algebra.vector import scale
 from starhold.errors import InputError, is_interrupt
 from starhold.laws.catalogue import Law, error_line, from_file
 from starhold.loop.kernels import form, make_step
@@ -26,6 +29,8 @@ if TYPE_CHECKING:
 
 _Model = TypeVar("_Model", bound=BaseModel)
 _Part = TypeVar("_Part", bound="Part | Body")
+TRIED = 8
+"""At how many attitudes a law is tried that is said to treat both quaternions alike."""
 RENAMED = {
     "double_cover": "quaternion_sign",
     "slope": "surface_gain",
@@ -210,6 +215,24 @@ def try_law(loop: Any, where: str, key: str) -> None:
             raise ValueError(f"{law.file.name}: {law.equation} must return three numbers and the memory, not {show(given)}")
         if form(pair[1]) != form(carry.memory):
             raise ValueError(f"{law.file.name}: the memory that {law.equation} returns must have the form of its argument")
+        if hasattr(measurement, "attitude") and law.card.quaternion_sign == "even":
+            _try_signs(loop, measurement, carry.memory)
+
+
+def _try_signs(loop: Any, measurement: Any, memory: Any) -> None:
+    """Raise ValueError where a law gives other torques at q than at -q, though its card says that it treats both alike: what
+    is claimed of its flights would be claimed at the other quaternion too."""
+    spread = np.random.default_rng(1).normal(size=(TRIED, 7))
+    for number, (*turned, x, y, z) in enumerate(spread.tolist()):
+        q: Any = normalise(tuple(turned))
+        # Rates of all sizes, for a law may clip.
+        shown = measurement._replace(rate=scale(10.0 ** -(number % 4), (x, y, z)))
+        one, other = (
+            np.array(loop.law.command(shown._replace(attitude=p), loop.gains, loop.known, memory)[0])
+            for p in (q, tuple(-part for part in q))
+        )
+        if not np.allclose(one, other, rtol=1e-9, atol=1e-9 * float(np.abs(one).max())):
+            raise ValueError(f"{loop.law.file.name}: its torque at q differs from that at -q, but its card says: even")
 
 
 def refuse_unstable(check: Callable[[], None], where: str, key: str) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.hand_over import flown_ends
+from starhold.certification.hand_over import flown_ends, misjudged
 from starhold.certification.matrices import above
 from starhold.certification.subject import make_subject
 from starhold.certification.wording import listed
@@ -196,7 +196,8 @@ def _unending(one: HandOver, before: str, last: Claim) -> list[str]:
     """Return the assumptions needed for a settled mode to end; none where it is no worse if the mode does not end."""
     n = last.numbers
     rate = n["rate"] + n["rate_error"]
-    settled = {"angle_below": n["angle"] + n["attitude_error"], "rate_below": rate, STORED: -inf}
+    settled = {"angle_below": n["angle"] + n["attitude_error"], STORED: -inf}
+    settled["rate_below"] = rate + misjudged(one.before, last)
     settled["body_rate_below"] = rate + above(make_subject(one.before).target_rate)
     unmet = [test for test, level in one.levels.items() if not settled.get(test, inf) < level]
     if unmet == [RELEASED]:

@@ -29,7 +29,7 @@ def check(text: str, where: str, folder: Any) -> dict[str, Any]:
         if scenario.table.requirement:
             check_requirements(scenario, scenario.laws[0])
     except InputError as error:
-        line = line_of(text, error.key, error.given)
+        line = line_of(text, error.key, str(error))
         return {"error": str(error), "key": error.key, "line": line}
     return {"name": scenario.name, "laws": [entry.name for entry in scenario.laws], "body": scenario.body}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import cache
+from functools import cache, cached_property
 from math import cos, isfinite, radians
 from typing import Any, NamedTuple, TypeAlias
 
@@ -16,16 +16,18 @@ from starhold.algebra.exponential import exponential
 from starhold.algebra.polynomial import exact
 from starhold.certification.appendages import appendages
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.finding import read
+from starhold.certification.evidence.finding import concluded, read
 from starhold.certification.evidence.recorded import sign_words
+from starhold.certification.evidence.responses import powers, weighed
 from starhold.certification.matrices import floats
 from starhold.certification.subject import above
 from starhold.certification.unmodelled import pushes
 from starhold.kernel.appended import Appended, Box, Column, Period, after, combined, follow, image
 from starhold.kernel.loops import TOLD_TORQUE, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, norm
+from starhold.kernel.numbers import WORK, RefusedError, norm
 from starhold.kernel.polynomials import most, var
-from starhold.kernel.theorems.appendages import FOLLOWED, inner, sized
+from starhold.kernel.theorems.appendages import FOLLOWED, KINDS, inner, responds, settled, sized
+from starhold.kernel.theorems.response import MOST, PARTS, Response
 
 APPENDED = "points with appendages"
 Array = NDArray[np.float64]
@@ -39,9 +41,10 @@ MORE, MARGIN, ROOM, TRIES, DIGITS = 1.0 + 1e-9, 1.001, 1.01, 30, 26
 """The margins of numbers, of bounds and of boxes; how often a box is widened; binary digits of modal coordinates."""
 FIRST = (1, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
 """The periods of the first rounds."""
-MOST_ROUNDS, NEARER, SHRUNK, STILL, LONGEST = 24, 0.8, 0.25, 0.98, 2**22
+MOST_ROUNDS, NEARER, SHRUNK, STILL, LONGEST, LEFT, SHARE = 24, 0.95, 0.25, 0.98, 2**22, 1e-3, 27
 """The most rounds, how much nearer each later one is to lead, the share of bounds that is to be left before it, what of that
-share is hardly less, and the most periods until then."""
+share is hardly less, the most periods until then, the share of a response that is left as it ends,
+and the work of a check by that of its samples for n states, n (n + 12), where these take a fifth of it."""
 Found: TypeAlias = "tuple[dict[str, Any], list[Round], Column, Period]"
 """The numbers of a start, rounds, bounds of samples as the last begins, and its period."""
 
@@ -68,11 +71,6 @@ class Round(NamedTuple):
     periods: int = 0
 
     @property
-    def turned(self) -> Fraction:
-        """Return a bound of |q|."""
-        return norm(self.state[3:6])
-
-    @property
     def written(self) -> dict[str, Any]:
         """Return it as evidence."""
         names = ("sizes", "torques", "radii")
@@ -90,7 +88,7 @@ class Swinging:
             raise RefusedError("the law is told a torque from outside")
         if any(f.part.flag("ACTS") for f in loop.loop.used("effector")):
             raise RefusedError("an effector takes the command")
-        against = pushes(loop.loop, loop.known.envelope(False))
+        against = pushes(loop.loop, loop.known.envelope(False)).steady
         outside = float(exact(against.outside) + exact(above(loop.known.modelled_norm)) + exact(loop.known.disturbance))
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
@@ -122,28 +120,53 @@ class Swinging:
             self.loop.failed[APPENDED] = "no bounds near the target were found that motions keep"
             return False
         numbers, rounds, begun, period = bounded
+        end = self.end(rounds[-1], period)
         while len(rounds) < MOST_ROUNDS:
-            one, (begun, periods) = rounds[-1], lasting(period, begun)
+            one, (begun, periods) = rounds[-1], self.lasting(period, begun)
             begun = list(map(min, begun, one.radii))
             another = self.round(begun, 0, period)
-            if another is None or not another[0].turned < NEARER * one.turned:
+            later = another and self.end(*another)
+            if another is None or later is None or not later[1] < NEARER * end[1]:
                 break
-            rounds, period = [*rounds[:-1], one._replace(periods=periods), another[0]], another[1]
-        return self.show(numbers, rounds, sum(one.periods for one in rounds))
+            rounds, period, end = [*rounds[:-1], one._replace(periods=periods), another[0]], another[1], later
+        return self.show(numbers, rounds, *end)
 
-    def show(self, numbers: dict[str, Any], rounds: list[Round], samples: int) -> bool:
-        """Add the claim with its evidence."""
-        loop, last = self.loop, rounds[-1]
-        half = float(last.turned) * MORE
+    @cached_property
+    def response(self) -> tuple[dict[str, Any], Response] | None:
+        """Return the evidence about the response, and what it shows; None if it lasts too long."""
+        A, ways = floats(self.motion.sampled), list(map(floats, self.motion.ways))
+        # So that the whole claim is checked within the work that it may take.
+        most = min(MOST, WORK // (SHARE * self.motion.n * (self.motion.n + 12)))
+        rows = powers(np.vstack([np.eye(self.motion.n)[:6], floats(self.motion.pull)]), A, most)
+        sizes = np.abs(rows[:, :6]).max(axis=2)
+        (gone,) = np.nonzero((sizes < LEFT * sizes.max(axis=0)).all(axis=1))
+        if not len(gone):
+            return None
+        evidence = weighed(rows[: gone[0]], PARTS, ways, KINDS)
+        return evidence, concluded(responds(self.motion, *evidence.values()))
+
+    def end(self, one: Round, period: Period) -> tuple[Fraction, Fraction, int]:
+        """Return bounds of |w| and |q| from so many samples of the last round on."""
+        if self.response is None:
+            return norm(one.state[:3]), norm(one.state[3:6]), 0
+        box = Box(one.state, one.torque, combined(one.state, self.motion.misread))
+        return *settled(self.motion, self.response[1], period, box, one.radii), self.response[1].count
+
+    def show(self, numbers: dict[str, Any], rounds: list[Round], wide: Fraction, turned: Fraction, last: int) -> bool:
+        """Add the claim with its evidence, and with bounds of |w| and |q| from so many samples of the last round on."""
+        loop = self.loop
+        half = float(turned) * MORE
         for _ in range(60):
-            half = float(last.turned) * MORE + half**3 / 6.0
+            half = float(turned) * MORE + half**3 / 6.0
         form = loop.form(self.V).at({"q0": 1 - var("v")})
         numbers = self.numbers | numbers
         highest = max(float(most(form, sized(one.state))) for one in rounds)
+        samples = sum(one.periods for one in rounds) + last
         numbers |= {"highest": highest * MORE, "settling": float(self.motion.h * samples) * MORE}
-        numbers |= {"end.angle": 2.0 * half * MORE, "end.rate": float(norm(last.state[:3])) * MORE}
+        numbers |= {"end.angle": 2.0 * half * MORE, "end.rate": float(wide) * MORE}
         claim = loop.claim(APPENDED, self.words, self.V, **numbers)
         claim["evidence"] = {"modes": exactly(self.modes), "blocks": self.blocks, "rounds": [one.written for one in rounds]}
+        claim["evidence"] |= {"response": self.response[0]} if self.response else {}
         return loop.try_to_show(claim, {f"q{k}": numbers["angle"] / 2.0 for k in (1, 2, 3)})
 
     def from_turn(self, turn: float) -> Found | None:
@@ -192,6 +215,22 @@ class Swinging:
             radii = [max(x, y) for x, y in zip(kept, radii, strict=True)]
         return None
 
+    def lasting(self, period: Period, begun: Column) -> tuple[Column, int]:
+        """Return bounds after so many periods that states or turns are much smaller, or shrink no further, and how many
+        these are."""
+        periods, last, (far, turned) = FOLLOWED, 1.0, self.extent(begun)
+        while True:
+            later = after(period, begun, periods)
+            share = min(float(new / old) for new, old in zip(self.extent(later), (far, turned), strict=True))
+            if share < SHRUNK or periods >= LONGEST or last > share > STILL * last:
+                return later, periods
+            periods, last = 2 * periods, share
+
+    def extent(self, radii: Column) -> tuple[Fraction, Fraction]:
+        """Return bounds of states, and of turns among them."""
+        state = image(self.motion.start, radii)
+        return norm(state), norm(state[3:6])
+
     def reached(self, radii: Sequence[float], period: Period | None) -> tuple[Column, Column]:
         """Return how large states and torques become with these bounds of samples."""
         r = list(map(Fraction, radii))
@@ -199,17 +238,6 @@ class Swinging:
             outside = [Fraction(self.numbers["outside"])] * 3
             return image(self.motion.spans, r), combined(image(self.motion.feedback, r), outside)
         return combined(image(period.between, r), period.far), combined(image(period.torque, r), period.pushed)
-
-
-def lasting(period: Period, begun: Column) -> tuple[Column, int]:
-    """Return bounds after so many periods that they are much smaller, or shrink no further, and how many these are."""
-    periods, last = FOLLOWED, 1.0
-    while True:
-        later = after(period, begun, periods)
-        share = max(float(y / x) for x, y in zip(begun, later, strict=True))
-        if share < SHRUNK or periods >= LONGEST or last > share > STILL * last:
-            return later, periods
-        periods, last = 2 * periods, share
 
 
 def modes_of(motion: Appended) -> tuple[Array, list[int]]:

@@ -20,7 +20,7 @@ from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
 from starhold.kernel.numbers import RefusedError, plus, times, transpose
 from starhold.kernel.regions import STATE, Tube, balls
-from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread
+from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
 from starhold.kernel.theorems.response import first_of, responds
 
 linalg: Any = import_module("scipy.linalg")
@@ -69,19 +69,21 @@ class Chain:
         late = of_late(self.motion.late)
         if self.motion.plan is None:
             return {"level": self.level} | late
-        off = self.motion.planned(self.motion.region(Fraction(self.level)).sizes)
+        region = self.motion.region(Fraction(self.level))
+        off = self.motion.planned((self.motion.tube(region).region if self.motion.grows else region).sizes)
         return {"level": self.level} | late | {"plan.error": float(off) * MORE}
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
-        c = Fraction(self.level)
+        c, tube = Fraction(self.level), None
         while len(self.levels) < LEVELS and (lower := self.lower(c)) is not None:
             tau, beta, floor = lower
             end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
             if end > c * Fraction(9, 10):
                 break
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
-            self.samples += periods(self.motion.h * beta, floor, c, end) + on_level(self.motion, end)[1]
+            tube, more = on_level(self.motion, end, tube or self.motion.tube(self.motion.region(c)))
+            self.samples += periods(self.motion.h * beta, floor, c, end) + more
             c = end
         return float(c)
 
@@ -136,6 +138,7 @@ class Chain:
             rate = max(highest_ratio(after, X) for after in moved)
             reach = highest_ratio(entered, X)
             inner = self.motion.tube(within.region.within(X, away))
+            more += waited(self.motion, within, inner)
             end = ends(self.motion, inner, X, away)
             if rate >= 1.0 or end[0] > angle * 0.99:
                 if not heed:
@@ -143,14 +146,8 @@ class Chain:
                 heed = 0.0
                 continue
             self.samples += more
-            self.ellipsoids.append(
-                {
-                    "shape": [[str(x) for x in row] for row in X],
-                    "shares": [str(x) for x in a],
-                    "rate": str(Fraction(rate)),
-                    "reach": str(Fraction(reach)),
-                }
-            )
+            one = {"shape": [[str(x) for x in row] for row in X], "shares": [str(x) for x in a]}
+            self.ellipsoids.append(one | {"rate": str(Fraction(rate)), "reach": str(Fraction(reach))})
             room = 1 - sum(a)
             fall = 1 - Fraction(rate) * room
             self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
@@ -178,6 +175,7 @@ class Chain:
             try:
                 within, more = forgotten(motion, tube)
                 begun, pulled, inner = response.after(motion, within, begun, pulled)
+                more += waited(motion, within, inner)
             except RefusedError:
                 break
             end = ends(self.motion, inner, balls(begun), motion.away)

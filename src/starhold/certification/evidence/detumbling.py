@@ -58,9 +58,9 @@ def find_detumbling(subject: Subject) -> RecordedLoop:
     return loop
 
 
-def bounds_of(subject: Subject) -> tuple[list[str], dict[str, Any]]:
-    """Return the words of the claim, and the numbers that are not about rates. NotFoundError for a loop that the theorem is
-    not about."""
+def bounds_of(subject: Subject, rate: float = 0.0) -> tuple[list[str], dict[str, Any]]:
+    """Return the words of the claim, and the numbers that are not about rates, for rates (rad/s) up to this one and up to
+    those of the start. NotFoundError for a loop that the theorem is not about."""
     loop = subject.loop
     rods = [f for f in loop.used("effector") if f.part.name == "magnetorquers" and f.part.file is None]
     idle = [f for f in loop.used("effector") if f.part.name == IDLE]
@@ -72,7 +72,7 @@ def bounds_of(subject: Subject) -> tuple[list[str], dict[str, Any]]:
     if any(has_friction(f.params) or f.params.unbalanced for f in idle):
         raise NotFoundError("wheels are braked by friction, or out of balance")
     turning, across = environment_torques(loop, subject.envelope(False))
-    outside = turning.torque + above(subject.modelled_norm) + fastest(loop) * turning.per_rate
+    outside = turning.torque + above(subject.modelled_norm) + max(fastest(loop), rate) * turning.per_rate
     if not isfinite(outside + across):
         raise NotFoundError("a torque from outside has no bound")
     least, change = field_along(loop, params.epoch)

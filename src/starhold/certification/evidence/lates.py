@@ -23,10 +23,11 @@ DIGITS, STARTS, BEYOND = 7, 500, 1.02
 """The digits of numbers; how many starts are tried, and the margin for others."""
 MARGINS = (1.05, 1.05, 1.05, 1.1)
 """By how much each bound of a part is larger than what follows from the one before."""
-LEAST, FINE = 1.0 - 4e-6, 1 << 30
-"""How exactly it is known at least how late something is, and the denominator of that."""
-WEIGHT = 0.9
-"""The weight with which what is late costs V the least, where it does so by the product of two forms."""
+LEAST, FINE = 1.0 - 3e-6, 1 << 30
+"""How exactly numbers are known that other machines may round otherwise, and the denominator of shares."""
+WEIGHT, SLIGHTEST = 0.9, Fraction(1 << 60)
+"""The weight with which what is late costs V the least, where it does so by the product of two forms; and one with which it
+is next to nothing on a level."""
 
 
 def numbers_of(late: contract.Late | None) -> dict[str, Any]:
@@ -43,8 +44,8 @@ def numbers_of(late: contract.Late | None) -> dict[str, Any]:
 def alike(late: contract.Late) -> list[tuple[Fraction, Fraction]]:
     """Return what is known at most and at least, in short numbers, of how late a torque is that nears what is asked for
     alike in all components: in the end of a period, in the mean, and in that by the time that is left."""
-    shares = [float(getattr(late, name)) for name in KNOWN]
-    return [(Fraction(ceil(x * FINE), FINE), Fraction(floor(x * LEAST * FINE), FINE)) for x in shares]
+    shares = [(float(getattr(late, name)), least) for name, least in zip(KNOWN, late.least, strict=True)]
+    return [(Fraction(ceil(x * FINE), FINE), Fraction(floor(y * LEAST * FINE), FINE)) for x, y in shares]
 
 
 def of_late(late: Late | None) -> dict[str, Fraction]:
@@ -56,9 +57,12 @@ def weighed(motion: Held, scales: Mapping[str, float]) -> Late | None:
     """Return how late the torque is with the weight with which it costs V about the least near the target, where rates and
     turns are of these sizes."""
     scale: Any = np.array([scales[name] for name in STATE])
-    change = motion.change_in(motion.tube(motion.region((motion.s + motion.G[3][3]) / 2**20)))
-    if motion.late is None or change is None:
+    if motion.late is None:
         return None
+    # Next to nothing is late there.
+    motion.late = replace(motion.late, weight=SLIGHTEST)
+    change = motion.change_in(motion.tube(motion.region((motion.s + motion.G[3][3]) / 2**20)))
+    assert change is not None
     work, moved = (float(np.linalg.norm(floats(rows) * scale, 2)) for rows in (motion.felt, change.M))
     return replace(motion.late, weight=rounded(WEIGHT * float(motion.h * motion.late.mean) * work / moved, DIGITS))
 

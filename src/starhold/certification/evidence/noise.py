@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.lates import alike
 from starhold.certification.matrices import floats
-from starhold.certification.unmodelled import driven_errors, noisy_fields, samples_of
+from starhold.certification.measured import driven_errors
+from starhold.certification.unmodelled import noisy_fields, samples_of
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.theorems.noise import (

@@ -25,7 +25,7 @@ from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.shapes import Shape, largest_in, soft
 from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
 from starhold.certification.matrices import above
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
+from starhold.certification.unmodelled import Pushes, change_of_modelled
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand
@@ -64,7 +64,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
         beyond = list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
-        kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
+        kinds = [True] * loop.known.noisy + [False]
     else:
         turn, rate = (float(Fraction(like.get(f"start.{name}", like.get(name, 0)))) for name in ("angle", "rate"))
         tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, list[float]())]
@@ -115,7 +115,8 @@ class Pushed:
         # The law's own potential has no force beside the law's, however far from the target.
         self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
-        demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
+        bounded = all(map(isfinite, against.numbers.values()))
+        demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
         self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}

@@ -18,8 +18,8 @@ from starhold.certification.appendages import appendages, appended_motion
 from starhold.certification.evidence.finding import NotFoundError, by_digests, complete, read, unproved
 from starhold.certification.evidence.shapes import Shape
 from starhold.certification.matrices import above
+from starhold.certification.measured import driven_errors
 from starhold.certification.subject import Subject
-from starhold.certification.unmodelled import driven_errors
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, REMEMBERS, SHORTEST, WHEELS, AttitudeLoop
 from starhold.kernel.plans import PLANNED
 from starhold.kernel.polynomials import Poly, var

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from math import ceil, log
 from typing import Any
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
-from starhold.kernel.theorems.response import MOST, PARTS
+from starhold.kernel.theorems.response import KINDS, MOST, PARTS
 
 Array = NDArray[np.float64]
 
@@ -29,20 +30,33 @@ def find_response(motion: Held) -> dict[str, Any] | None:
     if radius >= 1.0 or -SHORTEST / log(radius) > MOST:
         return None
     count = min(ceil(-LEFT / log(radius)), MOST)
-    powers = [np.vstack([np.eye(6), floats(motion.near.rates)]) @ np.eye(6, len(A))]
+    rows = powers(np.vstack([np.eye(6), floats(motion.near.rates)]) @ np.eye(6, len(A)), A, count)
+    return {"rounds": 1} | weighed(rows, PARTS, list(map(floats, motion.ways)), KINDS)
+
+
+def powers(rows: Array, A: Array, count: int) -> Array:
+    """Return rows times so many powers of a matrix."""
+    steps = [rows]
     for _ in range(count - 1):
-        powers.append(powers[-1] @ A)
-    weighed, gains, B = list[list[int]](), list[list[str]](), list(map(floats, motion.ways))
-    for part in PARTS.values():
-        rows = np.array(powers)[:, part]
-        first, last, turn = (G @ G.transpose(0, 2, 1) for G in (rows @ one for one in B))
-        weights = np.minimum(np.rint(FINEST * weigh(first + last)), LONGEST)
+        steps.append(steps[-1] @ A)
+    return np.array(steps)
+
+
+def weighed(
+    responses: Array, parts: Mapping[str, slice], ways: Sequence[Array], kinds: Sequence[Sequence[int]]
+) -> dict[str, Any]:
+    """Return the weights of responses, and the gains that are shown with them."""
+    chosen, gains = list[list[int]](), list[list[str]]()
+    for part in parts.values():
+        rows = responses[:, part]
+        squares = [G @ G.transpose(0, 2, 1) for G in (rows @ one for one in ways)]
+        weights = np.minimum(np.rint(FINEST * weigh(np.sum([squares[n] for n in kinds[0]], axis=0))), LONGEST)
         share = float((1.0 / weights).sum())
-        totals = (np.einsum("k,kij->ij", weights, one) for one in (2.0 * (first + last), last, turn))
+        totals = [np.einsum("k,kij->ij", weights, len(kind) * np.sum([squares[n] for n in kind], axis=0)) for kind in kinds]
         tops = [float(np.linalg.eigvalsh(one)[-1]) * share for one in totals]
-        weighed.append([int(m) for m in weights])
+        chosen.append([int(m) for m in weights])
         gains.append([float.hex(top**0.5 * MORE) for top in tops])
-    return {"rounds": 1, "weights": weighed, "gains": gains}
+    return {"weights": chosen, "gains": gains}
 
 
 def weigh(squares: Array) -> Array:

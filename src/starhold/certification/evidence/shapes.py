@@ -45,7 +45,7 @@ def largest(P: Array, even: bool, angle: float, rate: float) -> Array:
     half = min(angle, np.pi) / 2.0
     away = sin(half) if even else 2.0 * sin(half / 2.0)
     wide, leant, stiff = (np.linalg.norm(P[:, a, b], 2, (1, 2)) for a, b in ((RATE, RATE), (RATE, TURN), (TURN, TURN)))
-    return stiff * away**2 + wide * rate**2 + 2.0 * leant * rate * sin(half)
+    return np.asarray(stiff * away**2 + wide * rate**2 + 2.0 * leant * rate * sin(half), dtype=np.float64)
 
 
 def shares(motion: Held, limits: dict[str, Any]) -> Array:
@@ -73,8 +73,7 @@ def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
         slope[:, TURN, RATE] += P[:, TURN, TURN] * (1.0 - turned) / 2.0
     form = -(slope + slope.transpose(0, 2, 1))
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", form), 1e-300))
-    margins: Any = np.linalg.eigvalsh(form / scale[:, :, None] / scale[:, None, :])[:, 0]
-    return margins
+    return np.asarray(np.linalg.eigvalsh(form / scale[:, :, None] / scale[:, None, :])[:, 0], dtype=np.float64)
 
 
 def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> list[Shape]:
@@ -84,15 +83,17 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> lis
     potential, loads = floats(motion.form(motion.s / 2))[TURN, TURN], shares(motion, limits) @ torque
     stiff, moment = float(np.linalg.eigvalsh(potential)[-1]), float(np.trace(J)) / 3.0
     slow, inner = (stiff / float(np.linalg.eigvalsh(J)[-1])) ** 0.5, floats(inverse(motion.loop.given))
-    shapes, forms = list[Shape](), list[Array]()
-    for share, lean, about in product(SOFT, LEANS, (None, float(f"{moment:.4g}"))):
-        shape, M = Shape(float(f"{lean * slow:.4g}"), share, about), J if about is None else about * np.eye(3)
-        beside = shape.epsilon / 2.0 * M
-        form = np.block([[M / 2.0, beside], [beside, share * potential]])
-        if np.linalg.eigvalsh(form)[0] > 0.0:
-            shapes.append(shape)
-            forms.append(form)
-    P = np.array(forms).reshape(-1, 6, 6)
+    shapes = [
+        Shape(float(f"{lean * slow:.4g}"), share, about)
+        for share, lean, about in product(SOFT, LEANS, (None, float(f"{moment:.4g}")))
+    ]
+    forms = np.zeros((len(shapes), 6, 6))
+    for one, shape in zip(forms, shapes, strict=True):
+        M = J if shape.moment is None else shape.moment * np.eye(3)
+        one[RATE, RATE], one[TURN, TURN] = M / 2.0, shape.soft * potential
+        one[RATE, TURN] = one[TURN, RATE] = shape.epsilon / 2.0 * M
+    definite = np.linalg.eigvalsh(forms)[:, 0] > 0.0
+    shapes, P = [s for s, d in zip(shapes, definite, strict=True) if d], forms[definite]
     level = largest(P, motion.even, angle, rate)
     used = np.sqrt(level * np.einsum("li,nij,lj->nl", loads, np.linalg.inv(P), loads).max(1, initial=0.0))
     # At rest to every side: over the rates V is least with this of q.

@@ -83,7 +83,7 @@ def check(
     from starhold.conformance.suite import find_law
     from starhold.laws.catalogue import adopted
     from starhold.scenario.reading import load
-    from starhold.studies.certificates import compare_programs
+    from starhold.studies.certificates import compare_programs, left_open
 
     with ExitStack() as laws:
         # A certificate may come from anywhere, so only files that the user names are run.
@@ -92,9 +92,11 @@ def check(
             laws.enter_context(adopted(law))
         findings = check_file(path)
         whole = passed(findings)
-        others = compare_programs(path, load(scenario)) if whole and scenario is not None else []
+        compared = load(scenario) if whole and scenario is not None else None
+        others = [] if compared is None else compare_programs(path, compared)
+        beside = [] if compared is None or others else left_open(path, compared)
     if scenario is not None or any(finding.reason == BY_THE_KERNEL for finding in findings):
-        print_compared(others, scenario if whole else None)
+        print_compared(others, beside, scenario if whole else None)
     print_findings(findings)
     console.print(f"kernel.pyz of this version: sha256 {hashlib.sha256(kernel_bundle()).hexdigest()}", soft_wrap=True)
     if others or not whole:

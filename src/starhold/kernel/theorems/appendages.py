@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from ..appended import Appended, Box, Column, after, combined, follow, image
+from ..appended import Appended, Box, Column, Period, after, combined, follow, image
 from ..loops import AttitudeLoop, wired
 from ..near import form_of
-from ..numbers import Rows, definite, demand, inverse, matrix, norm, rational, read_list, read_table
+from ..numbers import Rows, added, definite, demand, inverse, matrix, norm, rational, reach, read_list, read_table, scalar
 from ..polynomials import minus, most, var
 from ..reading import Claim
 from ..regions import STATE
@@ -16,7 +16,9 @@ from ..rules import Exceeds, Part, Proof, vanish
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
 from .pointing import HALF_TURN, bounded_motion
+from .response import PARTS, Response, summed
 
+KINDS = (0, 1), (2,), (3,)
 ROUNDS, FOLLOWED = 32, 1024
 """The most rounds, and up to how many periods of one are followed one by one."""
 
@@ -29,7 +31,8 @@ def points_with_appendages(claim: Claim) -> Proof:
     more than `outside`. Both may grow by `.per.rate` times the body's rate.
 
     Evidence: modal coordinates, in blocks of one or two, and rounds of bounds: of them at samples (radii), of the states and
-    the torque between samples, and after how many periods the next round begins; the last one has no end."""
+    the torque between samples, and after how many periods the next round begins; the last one has no end. In its box
+    the response of the linear motion may be summed."""
     loop, numbers = AttitudeLoop(claim), claim.numbers
     yield from vanish("turning", minus(loop.single("turning", 4, wired("q", loop.q), wired("rate", loop.w)), loop.turning))
     motion = Appended(loop)
@@ -43,14 +46,15 @@ def points_with_appendages(claim: Claim) -> Proof:
     limits = [numbers.get(name) for name in ("limit", "limit.norm")]
     begun_with = [numbers[f"begun.{k}"] for k in range(motion.count)]
     begun, samples, V = motion.begun(ellipsoid, begun_with), 0, loop.lyapunov.at({"q0": 1 - var("v")})
-    times, turned, state = list[Fraction](), list[Fraction](), Column()
+    times, turned, ends = list[Fraction](), list[Fraction](), list[tuple[Period, Box, Column]]()
     rounds = read_list(claim.evidence["rounds"])
     demand(0 < len(rounds) <= ROUNDS, "there is no round, or too many are")
     for k, one in enumerate(rounds):
         sizes, torques, sought, periods = read_table(one, "sizes", "torques", "radii", "periods")
         demand(type(periods) is int and (periods > 0) == (k < len(rounds) - 1), "a round has no proper length")
         state, torque, radii = positive(sizes, motion.n), positive(torques, 3), positive(sought, len(blocks))
-        period = motion.period(Box(state, torque, combined(state, motion.misread)))
+        box = Box(state, torque, combined(state, motion.misread))
+        period = motion.period(box)
         times.append(motion.h * samples)
         turned.append(norm(state[3:6]))
         if 0 < periods <= FOLLOWED:
@@ -70,11 +74,19 @@ def points_with_appendages(claim: Claim) -> Proof:
         ):
             if limit is not None:
                 yield f"{name} {k}", Exceeds(limit, size)
+        ends.append((period, box, radii))
         begun, samples = later, samples + periods
+    wide, most_turned = norm(ends[-1][1].state[:3]), norm(ends[-1][1].state[3:6])
+    if (sums := claim.evidence.get("response")) is not None:
+        response = yield from responds(motion, *read_table(sums, "weights", "gains"))
+        wide, most_turned = settled(motion, response, *ends[-1])
+        samples += response.count
+        times.append(motion.h * samples)
+        turned.append(most_turned)
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
     # sin x >= x - x^3/6.
-    yield "end of the angle", Exceeds(angle / 2 - angle**3 / 48, norm(state[3:6]))
-    yield "end of the rate", Exceeds(fastest, norm(state[:3]))
+    yield "end of the angle", Exceeds(angle / 2 - angle**3 / 48, most_turned)
+    yield "end of the rate", Exceeds(fastest, wide)
     yield "settling", Exceeds(numbers["settling"], motion.h * samples)
 
     kinds = [("attitude that it is told", "error.attitude", "rad"), ("rate", "error.rate", "rad/s")]
@@ -90,6 +102,27 @@ def points_with_appendages(claim: Claim) -> Proof:
     # From the start of a round on, motions are turned by no more than in it and in later ones.
     within = [(time, max(turned[k:])) for k, time in enumerate(times)]
     return Statement(text + said, (*assumed, loop.sign_assumed), "appendages", within=tuple(within))
+
+
+def responds(motion: Appended, weights: object, gains: object) -> Part[Response]:
+    """The gains are no less than those of the linear motion of body and appendages: of rates, turns and the acceleration
+    that is linear in it, under torques from outside, which are free in a period, and under those held in error."""
+    return summed(scalar(1, motion.n)[:6] + motion.pull, PARTS, motion.sampled, motion.ways, KINDS, weights, gains)
+
+
+def settled(motion: Appended, response: Response, period: Period, box: Box, radii: Column) -> tuple[Fraction, Fraction]:
+    """Return bounds of |w| and |q| at all times from so many samples in a box on."""
+    wrong = period.error + norm(combined(image(period.law, radii), period.law_rest))
+    rest, pushes = motion.beside(period, box, wrong), (period.outside, period.outside, wrong)
+    wide, turned, pulled = (
+        added([gain * b for gain, b in zip(gains, pushes, strict=True)])
+        + norm(combined(reach(response.beside[part], rest), reach(response.left[part], box.state)))
+        for gains, part in zip(response.gains, PARTS.values(), strict=True)
+    )
+    # Each time is at most h/2 from a sample, and |q''| <= |w'|/2 + |w|^2 |q|/4.
+    h, hurried = motion.h, pulled + motion.hurried(period, box, radii, wrong)
+    bent = hurried + norm(box.state[:3]) ** 2 * norm(box.state[3:6]) / 2
+    return wide + h / 2 * hurried, turned + h * h / 16 * bent
 
 
 def inner(loop: AttitudeLoop, level: Fraction) -> Rows:

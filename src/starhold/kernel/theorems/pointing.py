@@ -6,13 +6,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
+from math import ceil
 
 from ..follower import FIRST, REST, WITHIN
 from ..held import Held
 from ..loops import AttitudeLoop
-from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
+from ..numbers import (
+    RefusedError,
+    Rows,
+    demand,
+    matrix,
+    norm,
+    plus,
+    rational,
+    read_list,
+    read_table,
+    root,
+    scalar,
+    times,
+    transpose,
+    up,
+)  # fmt: skip
 from ..reading import Claim, Numbers
-from ..regions import ANGLE, AT_REST, RATE, TURN, Tube, as_told, balls
+from ..regions import AMISS, ANGLE, AT_REST, RATE, TURN, Tube, as_told, balls
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
@@ -54,10 +70,11 @@ def points(claim: Claim) -> Proof:
     behind = motion.late.weight * motion.late.begun**2 if motion.late else Fraction(0)
     demand(behind < c or not behind, "what is late in the beginning is beyond the level")
     start = yield from contents(loop, loop.lyapunov + behind)
-    region = motion.region(c)
+    tube = motion.tube(motion.region(c))
+    region = tube.region
     planned, torques = "", None
     if motion.plan is not None:
-        wrong = motion.wrong
+        wrong = motion.wrong(region.sizes)
         planned, torques = yield from motion.plan.keeps(region, (wrong["w"], wrong["q"]), as_told(region.sizes, wrong))
     off = motion.misread(region)[0] + motion.planned(region.sizes)
     behind_at_most = motion.behind(region.sizes).most
@@ -68,8 +85,7 @@ def points(claim: Claim) -> Proof:
         yield "torque that follows", Exceeds(numbers[WITHIN], behind_at_most)
     limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques)
     if loop.signs:
-        yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
-    tube = motion.tube(region)
+        yield "the sign never changes", Exceeds(region.least, motion.misled(region.sizes)[0] / 2)
     if motion.late and (change := motion.change_in(tube)):
         yield "late torque", Exceeds(motion.late.rest, change.settled)
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * motion.swing(tube))
@@ -89,7 +105,7 @@ def points(claim: Claim) -> Proof:
         yield f"V decreases by a share {k}", Definite(fallen)
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
-        c, (tube, more) = end, on_level(motion, end)
+        c, (tube, more) = end, on_level(motion, end, tube)
         samples += more
         within.append((h * samples, tube.sizes[ANGLE]))
     last, beside, corners = tube.region.X, AT_REST, motion.corners()
@@ -113,7 +129,8 @@ def points(claim: Claim) -> Proof:
         yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], entered, -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
-        tube, last, entered, beside = motion.tube(tube.region.within(X, away)), X, X, away
+        before, tube, last, entered, beside = tube, motion.tube(tube.region.within(X, away)), X, X, away
+        samples += waited(motion, before, tube)
         within.append((h * samples, tube.sizes[ANGLE]))
     if (summed := claim.evidence.get("response")) is not None:
         rounds, weights, gains = read_table(summed, "rounds", "weights", "gains")
@@ -123,8 +140,8 @@ def points(claim: Claim) -> Proof:
         for _ in range(rounds):
             tube, more = forgotten(motion, tube)
             samples += more
-            radii, pulled, tube = response.after(motion, tube, radii, pulled)
-            samples += response.count
+            before, (radii, pulled, tube) = tube, response.after(motion, tube, radii, pulled)
+            samples += response.count + waited(motion, before, tube)
             within.append((h * samples, tube.sizes[ANGLE]))
             last, beside = balls(radii), away
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
@@ -140,6 +157,7 @@ def points(claim: Claim) -> Proof:
     misread += [("target's rate", motion.led, "rad/s"), ("target's acceleration", motion.hurried, "rad/s2")]
     begun = "V <= " + below(numbers["level"] - behind) + ", q0 > 0" * motion.even
     text = bounded_motion(numbers, begun, "", misread)
+    text += with_motion(motion)
     text += f", the torque that acts late, {motion.late.in_words}" if motion.late else ""
     text += motion.alike_in_words
     text += f", at no time by {above(numbers[WITHIN])} N m" if WITHIN in numbers else ""
@@ -157,12 +175,23 @@ def points(claim: Claim) -> Proof:
         *limited.assumptions,
     ]
     assumed += ["best-plan"] * bool(planned) + ["late-torque"] * bool(motion.late)
-    assumed += ["late-alike"] * bool(motion.inexact)
+    assumed += ["late-alike"] * bool(motion.inexact) + ["late-told"] * motion.grows
     assumed += loop.untold + ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
     said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
     return Statement(text + said, tuple(dict.fromkeys(assumed)), "pointing", within=tuple(within))
+
+
+def with_motion(motion: Held) -> str:
+    """Return what a claim says of errors that grow with the motion."""
+    text, of = "", (("rad/s", "rate"), ("rad/s2", "acceleration"))
+    for name, unit, sizes in zip(("attitude", "rate"), ("rad", "rad/s"), motion.moving, strict=True):
+        grown = zip(sizes, of, strict=True)
+        more = [f"{below(x)} {unit} for each {per} of the body's {which}" for x, (per, which) in grown if x]
+        text += f", errors of the told {name} of up to {' and '.join(more)} more" if more else ""
+    kept = f", and {below(motion.held_back)} times what was more before that" if motion.held_back else ""
+    return text and f"{text}, which are those of the last {below(motion.ago)} s{kept}"
 
 
 def bounded_motion(numbers: Numbers, begun: str, more: str, misread: Sequence[tuple[str, Fraction, str]]) -> str:
@@ -194,9 +223,11 @@ def spread(shares: Sequence[Fraction], pushes: Sequence[tuple[Rows, Fraction]]) 
     return grown
 
 
-def on_level(motion: Held, c: Fraction) -> tuple[Tube, int]:
-    """Return the tube of a level from when what was late before is forgotten, and after how many periods that is."""
-    tube, samples = motion.tube(motion.region(c)), 0
+def on_level(motion: Held, c: Fraction, before: Tube | None = None) -> tuple[Tube, int]:
+    """Return the tube of a level from when what was late before is forgotten, and after how many periods that is. before:
+    the tube in which motions came there."""
+    tube = motion.tube(motion.region(c))
+    samples = waited(motion, before, tube) if before else 0
     for _ in range(2 * bool(motion.late)):
         tube, more = forgotten(motion, tube, False)
         samples += more
@@ -220,7 +251,23 @@ def forgotten(motion: Held, tube: Tube, near: bool = True) -> tuple[Tube, int]:
         begun, end = sizes[REST], NEARLY * change.settled
         samples = periods(1 - change.kept, change.settled, begun, end)
         late_by = {REST: min(begun, end)}
-    return motion.tube(replace(tube.region, sizes=sizes | late_by)), samples
+    after = motion.tube(replace(tube.region, sizes=sizes | late_by))
+    return after, samples + waited(motion, tube, after)
+
+
+def waited(motion: Held, before: Tube, after: Tube) -> int:
+    """Return after how many periods in the region of a tube what the law is told is off by no more than there, as that is
+    forgotten which the body did in the tube before."""
+    if not motion.grows:
+        return 0
+    amiss, end = ([tube.region.sizes[x] for x in AMISS] for tube in (before, after))
+    for k in range(ROUNDS):
+        if all(x <= y for x, y in zip(amiss, end, strict=True)):
+            return k * max(1, ceil(motion.ago / motion.h))
+        tube = motion.tube(after.region, amiss)
+        less = motion.misleading(tube)
+        amiss = [min(x, up(y + motion.held_back * (x - y))) for x, y in zip(amiss, less, strict=True)]
+    raise RefusedError("errors are not forgotten")
 
 
 def periods(fall: Fraction, floor: Fraction, start: Fraction, end: Fraction) -> int:

@@ -1,8 +1,9 @@
 """How far bounded pushes take the linear motion near a target: by sums of its impulse response. Proof: docs/kernel.md,
-section 10."""
+sections 10 and 12."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
@@ -31,21 +32,24 @@ from ..rules import Definite, Part
 PLACES, MOST = 80, 6000
 """The places after the point of responses, and how many samples they may take."""
 PARTS = {"rate": RATE, "turn": TURN, "acceleration": slice(6, 9)}
+KINDS = (0, 1), (1,), (2,)
 Sparse = list[list[tuple[int, int]]]
 
 
 @dataclass(frozen=True)
 class Response:
-    """So many samples of z+ = Az + the sum of B v, |v| <= b: how large |w|, |q| and the acceleration that is linear in z
-    become for b = 1, of the first two B together, of the second and of the third, and what is left of the first sample."""
+    """So many samples of z+ = Az + the sum of B v, |v| <= b: how large parts of what is bounded become for b = 1, of each
+    kind of pushes, what is left of the first sample, and how large, row by row, what else each sample adds makes it."""
 
     count: int
     gains: list[list[Fraction]]
     left: Rows
+    beside: Rows
 
     def after(self, motion: Held, tube: Tube, begun: Radii, pulled: Fraction) -> tuple[Radii, Fraction, Tube]:
         """Return |w| and |q| of z after these samples in the tube's region, its acceleration, and the tube from there on:
-        from what they were before. What momentum makes of z is a push here."""
+        from what they were before. Kinds of pushes are the first two B together, the second, and the third. What momentum
+        makes of z is a push here."""
         away, swayed, region_sizes = motion.away, motion.swayed, tube.region.sizes
         first, last, turn = (b for _, b in motion.linear(tube, begun[0], pulled))
         pushes = first, max(last - first, Fraction(0)), turn
@@ -66,39 +70,56 @@ def first_of(motion: Held, tube: Tube) -> tuple[Radii, Fraction]:
 
 
 def responds(motion: Held, weights: Any, gains: Any) -> Part[Response]:
-    """The gains are no less than those of the loop. weights: m_k, for each part of what is bounded. Of the sum x of
-    C_k B v_k (y.x)^2 is no more than the sum of 1/m_k times that of m_k |B'C_k'y|^2 (Cauchy and Schwarz)."""
-    (A, below), (B, under) = columns(motion.near.A), columns(reduce(beside, motion.ways))
+    """The gains are no less than those of the loop, of its rates, its turn and the acceleration that is linear in both."""
     # What C_0 is of (w, q): the torque that acts late is in none of them.
-    first = [row + [Fraction(0)] * (len(motion.near.A) - len(STATE)) for row in scalar(1, 6) + motion.near.rates]
-    count = len(read_list(read_list(weights, len(PARTS))[0]))
+    rows = [row + [Fraction(0)] * (len(motion.near.A) - len(STATE)) for row in scalar(1, 6) + motion.near.rates]
+    return summed(rows, PARTS, motion.near.A, motion.ways, KINDS, weights, gains)
+
+
+def summed(
+    outputs: Rows,
+    parts: Mapping[str, slice],
+    A: Rows,
+    ways: Sequence[Rows],
+    kinds: Sequence[Sequence[int]],
+    weights: Any,
+    gains: Any,
+) -> Part[Response]:
+    """The gains are no less than those of z+ = Az + the sum of B v. kinds: of each kind of pushes the places of its B, of
+    three columns. weights: m_k, for each part of what is bounded. Of the sum x of C_k B v_k (y.x)^2 is no more than the sum
+    of 1/m_k times that of m_k |B'C_k'y|^2 (Cauchy and Schwarz)."""
+    (moved, below), (B, under) = columns(A), columns(reduce(beside, ways))
+    count = len(read_list(read_list(weights, len(parts))[0]))
     demand(0 < count <= MOST, "a response has no samples, or too many")
     weighed = [read_list(one, count) for one in weights]
-    most = [list(map(rational, read_list(one, len(motion.ways)))) for one in read_list(gains, len(PARTS))]
+    most = [list(map(rational, read_list(one, len(kinds)))) for one in read_list(gains, len(parts))]
     demand(all(type(m) is int and m > 0 for chosen in weighed for m in chosen), "a weight is not a whole number")
-    rows = [[(x.numerator << PLACES) // x.denominator for x in row] for row in first]
-    sums = [[[[0] * 3 for _ in range(3)] for _ in motion.ways] for _ in weighed]
+    rows = [[(x.numerator << PLACES) // x.denominator for x in row] for row in outputs]
+    sums = [[[[0] * 3 for _ in range(3)] for _ in ways] for _ in weighed]
+    sizes = [[0] * len(A) for _ in rows]
     for k in range(count):
-        Account.spend(160, 3 * PLACES)
+        Account.spend(len(rows) * len(A) * (len(A) + len(B)) // 8, 3 * PLACES)
+        sizes = [[x + abs(y) for x, y in zip(*pair, strict=True)] for pair in zip(sizes, rows, strict=True)]
         steps = carried(rows, B, under)
-        for part, weights, parts in zip(PARTS.values(), weighed, sums, strict=True):
-            m = weights[k]
-            for place, total in enumerate(parts):
+        for part, chosen, totals in zip(parts.values(), weighed, sums, strict=True):
+            m = chosen[k]
+            for place, total in enumerate(totals):
                 block = [row[3 * place : 3 * place + 3] for row in steps[part]]
                 for x, row in zip(total, block, strict=True):
                     x[:] = [y + m * sum(map(mul, row, other)) for y, other in zip(x, block, strict=True)]
-        rows = carried(rows, A, below)
+        rows = carried(rows, moved, below)
     # What is rounded off, in each entry, all the while.
     off = Fraction(count + 1, 1 << PLACES)
-    for name, chosen, (begin, last, turn), gains in zip(PARTS, weighed, sums, most, strict=True):
+    for name, chosen, totals, gained in zip(parts, weighed, sums, most, strict=True):
         share = Fraction(sum(-(-(1 << PLACES) // m) for m in chosen), 1 << 3 * PLACES)
-        # (|a| + |b|)^2 <= 2 (|a|^2 + |b|^2)
-        both = [[2 * (x + y) for x, y in zip(*rows, strict=True)] for rows in zip(begin, last, strict=True)]
-        for place, (total, gain) in enumerate(zip((both, last, turn), gains, strict=True)):
+        for place, (kind, gain) in enumerate(zip(kinds, gained, strict=True)):
             demand(gain > 6 * off, "a gain is too small")
-            weighted = [[share * x for x in row] for row in total]
+            # (|a| + |b|)^2 <= 2 (|a|^2 + |b|^2)
+            both = [list(map(sum, zip(*rows, strict=True))) for rows in zip(*(totals[n] for n in kind), strict=True)]
+            weighted = [[len(kind) * share * x for x in row] for row in both]
             yield f"response of the {name} {place}", Definite(plus(scalar((gain - 6 * off) ** 2), weighted, -1))
-    return Response(count, most, [[abs(Fraction(x, 1 << PLACES)) + off for x in row] for row in rows])
+    left, made = ([[abs(Fraction(x, 1 << PLACES)) + off for x in row] for row in part] for part in (rows, sizes))
+    return Response(count, most, left, made)
 
 
 def columns(rows: Rows) -> tuple[Sparse, int]:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
 from starhold.algebra.scalar import Scalar, both, less, opposite, where
 from starhold.algebra.structure import chosen
-from starhold.algebra.vector import IDENTITY, ZERO, Vector, scale, subtract
+from starhold.algebra.vector import IDENTITY, ZERO, Vector, add, apply, diagonal, scale, subtract
+from starhold.algebra.vector import multiply as product
 from starhold.parts.attitudes import attitudes_of, small_turn, together
-from starhold.parts.contract import FIX, Card, Parameter
+from starhold.parts.contract import FIX, Card, Noise, Parameter, Recursion
 from starhold.parts.craft import Craft
+from starhold.parts.kalman import turned
 from starhold.parts.stated_attitude import START, VALID, unit_quaternion
 
 CARD = Card(
@@ -93,6 +96,32 @@ def _started(memory: Memory, readings: Any) -> Memory:
         return memory
     first = both(less(0.5, readings.fix.is_valid), less(memory.begun, 0.5))
     return chosen(first, memory._replace(attitude=readings.fix.attitude, begun=1.0), memory)
+
+
+def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recursion | None:
+    """Return the recursion by which noise of gyro and attitudes drives the errors of attitude and bias, on a body at a
+    constant rate (rad/s, body axes); None where no bias is corrected. A step holds the rate as it begins."""
+    if not params.bias_gain:
+        return None
+    (_, axes, drift), share = turned(rate, period), 1.0 / (1 + len(noise.more))
+    seen = [product(diagonal((share, share, share)), root) for root in (noise.attitude, *noise.more)]
+
+    def amiss(turn: Vector, bias: Vector, random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+        rate = subtract(scale(noise.rate, random[0]), bias)
+        ahead = subtract(apply(axes, turn), apply(drift, rate))
+        return (ahead, subtract(bias, scale(noise.walk, random[1]))), turn, rate
+
+    def carried(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+        turn, bias = errors
+        return amiss(turn, bias, random)
+
+    def corrected(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+        turn, bias = errors
+        off = subtract(reduce(add, map(apply, seen, random[2:])), turn)
+        turn = add(turn, scale(params.attitude_gain, off))
+        return amiss(turn, subtract(bias, scale(params.bias_gain * period, off)), random)
+
+    return Recursion(corrected, carried, noise.every, 2, 2 + len(seen), 0.5 * period)
 
 
 def examples() -> list[Params]:

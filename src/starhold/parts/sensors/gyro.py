@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import ZERO, Matrix, Vector, add, scale
+from starhold.algebra.vector import IDENTITY, ZERO, Matrix, Vector, add, diagonal, multiply, scale
 from starhold.parts import as_built
 from starhold.parts.contract import UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.random import Dice
@@ -136,14 +136,19 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """Return the initial bias and half a step of the resolution as a bound; errors that grow with the rate, wander or are
-    due to delay have no bound."""
-    built = as_built.is_given(params.scale_error, params.mounting_error, params.axis_errors, params.bias_instability)
-    built = built or as_built.is_given(params.delay, params.jitter)
-    if built or params.limit < math.inf:
+    """Return the initial bias and half a step of the resolution, what scale factor and axes make of the rate, and its change
+    during a delay; errors that wander have no bound, nor has a reading that is clipped."""
+    if as_built.is_given(params.bias_instability, params.jitter) or params.limit < math.inf:
         return UNBOUNDED
-    bias = math.hypot(*params.bias)
-    return Errors(rate=bias + as_built.off_step(params.resolution), bias=bias)
+    factor, bias = 1.0 + params.scale_error, math.hypot(*params.bias)
+    axes = as_built.axes_of(params.mounting_error, params.axis_errors) or IDENTITY
+    return Errors(
+        rate=bias + as_built.off_step(params.resolution),
+        bias=bias,
+        turned=as_built.stretch(multiply(diagonal((factor, factor, factor)), axes)),
+        late=params.delay,
+        ago=params.delay,
+    )
 
 
 def noise(params: Params, period: float) -> Noise:
@@ -153,10 +158,12 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """Return a MEMS gyro, one with only a bias, an exact one, and one with errors of manufacture, a delay and jitter."""
+    """Return a MEMS gyro, one with only a bias, an exact one, one with errors of manufacture, a delay and jitter, and that
+    without what has no bound."""
     mems = Params(noise=math.radians(0.15) / 60.0, bias=(1e-4, -2e-4, 5e-5), bias_walk=math.radians(3.0) / HOUR)
     skewed = ((1e-3, 0.0, 5e-4), (0.0, -2e-3, 0.0), (0.0, 3e-4, 0.0))
     built = mems._replace(
         mounting_error=(2e-3, 0.0, -1e-3), axis_errors=skewed, resolution=1e-4, bias_instability=1e-5, correlation_time=300.0
     )._replace(delay=0.03, jitter=1e-3)
-    return [mems._replace(limit=math.radians(100.0)), Params(bias=mems.bias), Params(), built]
+    bounded = built._replace(bias_instability=0.0, jitter=0.0)
+    return [mems._replace(limit=math.radians(100.0)), Params(bias=mems.bias), Params(), built, bounded]

@@ -152,11 +152,12 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """Return the mounting error if attitudes are not delayed; the craft's rotation during a delay has no bound."""
+    """Return the mounting error, and the craft's rotation during a delay; no bound where readings may stop."""
     silent = params.outage != NEVER or params.sun_cone or params.moon_cone or any(params.limb_cones)
-    if params.delay or as_built.is_given(params.jitter) or silent or params.rate_limit < math.inf:
+    if as_built.is_given(params.jitter) or silent or params.rate_limit < math.inf:
         return UNBOUNDED
-    return NO_ERRORS._replace(attitude=math.hypot(*params.mounting_error))
+    late = {"turning": as_built.behind(params.delay), "ago": params.delay}
+    return NO_ERRORS._replace(attitude=math.hypot(*params.mounting_error), **late)
 
 
 def noise(params: Params, period: float) -> Noise:

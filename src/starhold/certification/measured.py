@@ -1,0 +1,276 @@
+"""Computes how far off what a law is told of attitude and rate is: at most, besides noise, and as noise drives it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache, reduce
+from math import ceil, hypot, isfinite, log
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.quaternion import NO_TURN
+from starhold.algebra.structure import flatten, leaves
+from starhold.algebra.vector import IDENTITY, Vector, apply, scale
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import NO_ERRORS, Errors, Noise, Recursion
+from starhold.parts.part import Fitted
+
+Array = NDArray[np.float64]
+TELLING = ("sensor", "estimator")
+"""Roles whose `error` affects the law's measurements."""
+PLACED = frozenset(("position", "velocity"))
+"""What a part may tell that has no bound of its errors."""
+SMALL, MOST, SHARE = 1e-9, 100_000, 0.3
+"""What is left of an error that an estimate forgets, as a share; the most cycles from one new attitude to the next in which
+it does; and about what is left after `ago`."""
+
+
+class Told(NamedTuple):
+    """How far off the attitude (rad) and the rate (rad/s) are at most: steadily, and in proportion to the body's rate and
+    acceleration. Each `ago` (s) what is more, after a faster motion, falls to a share `kept` of that."""
+
+    attitude: float = 0.0
+    rate: float = 0.0
+    attitude_per_rate: float = 0.0
+    attitude_per_acceleration: float = 0.0
+    rate_per_rate: float = 0.0
+    rate_per_acceleration: float = 0.0
+    ago: float = 0.0
+    kept: float = 0.0
+
+    @property
+    def grows(self) -> bool:
+        """Whether the errors grow with the motion."""
+        return any(self[2:6])
+
+    def __add__(self, other: Any) -> Told:
+        pairs = [*zip(self, other, strict=True)]
+        return Told(*(x + y for x, y in pairs[:6]), *(max(pair) for pair in pairs[6:]))
+
+
+class Measured(NamedTuple):
+    """The errors of an estimate, or of noisy readings that the law uses directly: besides noise, and as noise drives them;
+    the parts that they come from, and whether there is noise."""
+
+    amiss: Told
+    recursion: Recursion
+    parts: tuple[Fitted, ...]
+    random: bool
+
+
+class Driven(NamedTuple):
+    """Noise-driven errors, and the parts with the noise; the deviation of a random torque about each axis (N m)."""
+
+    recursion: Recursion
+    parts: tuple[Fitted, ...]
+    torque: float = 0.0
+
+
+def driven_errors(loop: ClosedLoop) -> Driven | None:
+    """Return what noise drives in a loop: errors of what its law is told, which are none where its parts do not say them,
+    and random torques from outside. None without either, and where the target depends on the law's mode."""
+    if loop.target.part.flag("BY_MODE"):
+        return None
+    result = measured(loop)
+    torques = [fitted for fitted in loop.used("environment") if noise_of(fitted, loop.period).torque]
+    if result is not None and result.random:
+        driven = Driven(result.recursion, (*result.parts, *torques))
+    elif torques:
+        driven = Driven(_as_read(Noise()), tuple(torques))
+    else:
+        return None
+    return driven._replace(torque=hypot(*(noise_of(fitted, loop.period).torque for fitted in torques)))
+
+
+def measured(loop: ClosedLoop) -> Measured | None:
+    """Return the errors of an estimate, or of readings that the law uses directly and of which some are noisy; None where
+    parts do not fully declare them, where an estimator does not forget them, and where sensors of one quantity are not read
+    together."""
+    if loop.target.part.flag("BY_MODE"):
+        return None
+    estimators = loop.used("estimator")
+    wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
+    sensors = tuple(f for f in loop.used("sensor") if wanted & shown(f))
+    bounds = [bounded(f, loop.period, bool(estimators)) for f in sensors]
+    if not sensors or None in bounds or any(f.part.hook("noise") is None for f in sensors):
+        return None
+    several = getattr(estimators[0].part.module, "SEVERAL", ()) if estimators else ()
+    attitudes, rates = (
+        [(noise_of(f, loop.period), bound) for f, bound in zip(sensors, bounds, strict=True) if name in shown(f)]
+        for name in ("attitude", "rate")
+    )
+    every = {noise.every for noise, _ in attitudes}
+    if len(rates) > 1 or len(every) > 1 or (len(attitudes) > 1 and "attitude" not in several):
+        return None
+    noise = Noise()
+    for first, _ in attitudes[:1]:
+        others = tuple(other.attitude for other, _ in attitudes[1:])
+        noise = noise._replace(attitude=first.attitude, every=first.every, more=others)
+    for reading, _ in rates:
+        noise = noise._replace(rate=reading.rate, walk=reading.walk)
+    random = is_random(noise)
+    if not estimators:
+        amiss = reduce(Told.__add__, (as_read(bound) for bound in bounds if bound is not None))
+        return Measured(amiss, _as_read(noise), sensors, True) if random and not noise.walk else None
+    tell: Any = estimators[0].part.hook("recursion")
+    if tell is None:
+        return None
+    given = estimators[0].params, loop.period, _rate(loop)
+    recursion: Recursion | None = tell(given[0], noise, *given[1:])
+    if recursion is None:
+        return None
+    amiss = _estimated(recursion.lag, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
+    return None if amiss is None else Measured(amiss, recursion, (*sensors, *estimators), random)
+
+
+def bounded(fitted: Fitted, period: float, estimated: bool = False) -> Errors | None:
+    """Read the declared largest errors of a part besides its noise, where they are finite; those of an attitude that is held
+    between updates too, where no estimator waits for them. None of these is one of a place."""
+    tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING and not tells_place(fitted) else None
+    largest: Errors = NO_ERRORS if tell is None else tell(fitted.params)
+    if tell is None or not all(map(isfinite, largest)):
+        return None
+    between = 0.0 if estimated else (noise_of(fitted, period).every - 1) * period
+    return largest._replace(turning=largest.turning + between, ago=largest.ago + between)
+
+
+def as_read(errors: Errors) -> Told:
+    """Return errors of readings that the law uses directly."""
+    return Told(errors.attitude, errors.rate, errors.turning, 0.0, errors.turned, errors.late, errors.ago)
+
+
+def noise_of(fitted: Fitted, period: float) -> Noise:
+    """Return the noise of a part, by default none."""
+    tell: Any = fitted.part.hook("noise")
+    return Noise() if tell is None else tell(fitted.params, period)
+
+
+def is_random(noise: Noise) -> bool:
+    """Return whether a reading has an unbounded error."""
+    return any(leaves(noise._replace(every=0)))
+
+
+def shown(sensor: Fitted) -> set[str]:
+    """Return the names of a sensor's readings."""
+    return set(sensor.part.module.Reading._fields)
+
+
+def tells_place(fitted: Fitted) -> bool:
+    """Return whether a sensor or an estimator tells a position or velocity."""
+    module: Any = fitted.part.module
+    return not PLACED.isdisjoint((module.Reading if fitted.part.role == "sensor" else module.Estimate)._fields)
+
+
+def _estimated(lag: float, tell: Any, given: Any, noise: Noise, rates: list[Any], attitudes: list[Any]) -> Told | None:
+    """Return the errors of an estimate with errors of its readings besides noise; None where it does not forget them. It
+    removes a bias of the rate. lag: of its recursion."""
+    units = noise._replace(attitude=IDENTITY, rate=1.0, walk=0.0, more=(IDENTITY,) * len(noise.more))
+    steady = [(gyro.rate - gyro.bias, gyro.turned, gyro.late) for gyro in rates[:1]] or [(0.0, 0.0, 0.0)]
+    steady += [(tracker.attitude, tracker.turning, 0.0) for tracker in attitudes]
+    if not lag and not any(map(any, steady)):
+        return Told()
+    gains = _gains(tell, given, units)
+    if gains is None:
+        return None
+    towards, later, steps, kept = gains
+    # Of attitude and rate: how much comes of each reading.
+    (attitude, turned, hurried), (rate, rated, late) = (
+        [float(np.dot(one, sizes)) for sizes in zip(*steady, strict=True)] for one in towards
+    )
+    hurried, late = (x + more for x, more in zip((hurried, late), later, strict=True))
+    ago = steps * given[1] + max(one.ago for one in (*rates, *attitudes))
+    return Told(attitude, rate, turned, hurried, rated, late, ago, kept)
+
+
+@cache
+def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list[float], int, float] | None:
+    """Return how large errors of attitude and rate become at most with errors of up to one of the gyro and of each attitude,
+    and with an acceleration of the body of one; after how many steps about a share of what is more is left, and what share.
+    None for an estimate that does not forget. noise: of deviations of one."""
+    recursion: Recursion = tell(given[0], noise, *given[1:])
+    every, size = recursion.every, 3 * recursion.size
+    steps = [*[_matrix(recursion.carried, recursion)] * (every - 1), _matrix(recursion.corrected, recursion)]
+    motions = [step[:size, :size] for step in steps]
+    radius = float(np.abs(np.linalg.eigvals(reduce(lambda one, A: A @ one, motions, np.eye(size)))).max())
+    if radius >= 1.0 or (count := ceil(log(SMALL) / log(max(radius, SMALL)))) > MOST:
+        return None
+    result = [_sums(steps, phase, count, size) for phase in range(every)]
+    lags = np.max([np.cumsum(one[..., ::-1], axis=-1)[..., ::-1] for one in result], axis=0) * (1.0 + 1e-6)
+    # From lags of k steps on: rows for attitude and rate, columns for readings.
+    towards, later = lags[..., 0].tolist(), (recursion.lag * lags[:, 0, 1]).tolist()
+    first = every * max(1, ceil(log(SHARE) / log(max(radius, SMALL))))
+    while first < lags.shape[-1]:
+        # Of the gyro's errors at earlier steps too, whose whole is less.
+        wholes: Array = lags[..., 0].copy()
+        wholes[:, 0] = lags[:, 0, 1]
+        after: Array = lags[..., first::first] / np.maximum(wholes, 1e-300)[..., None]
+        shares: Array = np.power(after, 1.0 / np.arange(1.0, after.shape[-1] + 1.0))
+        kept = float(shares.max())
+        if kept <= 2.0 * SHARE:
+            return towards, later, first, kept
+        first *= 2
+    return towards, later, lags.shape[-1], SMALL
+
+
+def _sums(steps: list[Array], phase: int, count: int, size: int) -> Array:
+    """Return the sizes of the errors of attitude and rate at a step of a cycle that each reading makes, from 0 to so many
+    cycles of steps before: (2, readings, lags)."""
+    every, readings = len(steps), steps[0].shape[1] // 3 - size // 3 - 1
+    order = [steps[(phase + k) % every][:size, :size] for k in range(every)]
+    motion, amiss = reduce(lambda one, A: A @ one, order, np.eye(size)), steps[phase][size:, :size]
+    powers = np.array([amiss])
+    while len(powers) < count:
+        powers, motion = np.concatenate([powers, powers @ motion]), motion @ motion
+    sizes = np.zeros((2, readings, every * (len(powers) + 1)))
+    # The gyro's, without its walk, and the attitudes', which are new at the last step of a cycle.
+    places = [0, *range(2, readings + 1)]
+    since = np.eye(size)
+    for lag in range(every + 1):
+        at = (phase - lag) % every
+        given = steps[at]
+        for k, place in enumerate(places):
+            if k and at != every - 1:
+                continue
+            column = slice(size + 3 * place, size + 3 * place + 3)
+            if lag == 0:
+                sizes[:, k, 0] = [np.linalg.norm(given[size + part : size + part + 3, column], 2) for part in (0, 3)]
+                continue
+            made = powers @ (since @ given[:size, column])
+            for row, part in enumerate((0, 3)):
+                sizes[row, k, lag::every][: len(made)] = np.linalg.norm(made[:, part : part + 3], 2, axis=(1, 2))
+        since = since @ steps[at][:size, :size] if lag else since
+    return sizes
+
+
+def _matrix(step: Callable[..., Any], recursion: Recursion) -> Array:
+    """Return the matrix of a step of a recursion, from errors and noise to the errors at the next and those told."""
+
+    def columns() -> Iterator[list[float]]:
+        count = recursion.size + recursion.noises
+        for unit in np.eye(3 * count):
+            vectors = [tuple(unit[k : k + 3].tolist()) for k in range(0, 3 * count, 3)]
+            yield flatten(step(tuple(vectors[: recursion.size]), tuple(vectors[recursion.size :])))
+
+    return np.array(list(columns())).T
+
+
+def _as_read(noise: Noise) -> Recursion:
+    """Return the errors of readings that the law uses directly, of which attitudes are held between updates."""
+
+    def between(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+        return errors, errors[0], scale(noise.rate, random[0])
+
+    def read(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+        return between((apply(noise.attitude, random[2]),), random)
+
+    return Recursion(read, between, noise.every, 1)
+
+
+def _rate(loop: ClosedLoop) -> Vector:
+    """Return the rate (rad/s) of a body on target as the loop starts, to six digits, on which all machines agree."""
+    target = loop.target
+    rate: Any = target.part.module.goal(target.prepared(loop.period), loop.start, 0, NO_TURN).rate
+    x, y, z = (float(f"{part:.6g}") for part in rate)
+    return x, y, z
