@@ -2,7 +2,7 @@
 set of a claim."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias, cast
 
@@ -86,13 +86,16 @@ class Span:
 
     def unmet(self, claim: Claim) -> list[Departure]:
         """Return a departure for every assumption of a claim that the flight does not meet."""
-        tests = (unmet for name in claim.assumptions if (unmet := assumption(name).unmet) is not None)
-        return [one for unmet in tests for where, how in unmet(self) for one in self.first(where, how)]
+        return [one for where, how in self._tested(claim) for one in self.first(where, how)]
 
     def unmet_throughout(self, claim: Claim) -> list[str]:
         """Return how the loop does not meet a claim's assumptions, whatever its motion."""
+        return [how for where, how in self._tested(claim) if not np.ndim(where) and where]
+
+    def _tested(self, claim: Claim) -> Iterator[tuple[Any, str]]:
+        """Return where a claim's assumptions are not met, and how."""
         tests = (unmet for name in claim.assumptions if (unmet := assumption(name).unmet) is not None)
-        return [how for unmet in tests for where, how in unmet(self) if not np.ndim(where) and where]
+        return (pair for unmet in tests for pair in unmet(self))
 
 
 def departures(

@@ -1,4 +1,4 @@
-"""Computes how far off what a law is told of attitude and rate is: at most, besides noise, and as noise drives it."""
+"""Bounds the errors of the attitude and rate that laws receive: the largest besides noise, and those that noise drives."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 TELLING = ("sensor", "estimator")
 """Roles whose `error` affects the law's measurements."""
 PLACED = frozenset(("position", "velocity"))
-"""What a part may tell that has no bound of its errors."""
+"""Readings whose errors no part can bound."""
 SMALL, MOST, SHARE = 1e-9, 100_000, 0.3
-"""What is left of an error that an estimate forgets, as a share; the most cycles from one new attitude to the next in which
-it does; and about what is left after `ago`."""
+"""The share of an error below which an estimate has forgotten it; the most cycles, from one new attitude to the next, that
+this may take; and about the share that is left after `ago`."""
 
 
 class Told(NamedTuple):

@@ -57,7 +57,7 @@ GROWING = (
 )
 """The numbers of a claim about errors of what the law is told that grow as the body moves."""
 SETTLED = ("linear-estimate", "settled-estimate")
-"""What a claim about an estimate assumes of it."""
+"""Assumptions of claims about an estimate."""
 MORE, LARGER = 1.0 + 1e-12, 1.0 + 1e-6
 """A margin for the floating-point sum, and one for numbers that other machines may round otherwise."""
 

@@ -38,8 +38,8 @@ SPENT, SPARE = Fraction(1, 4), Fraction(1, 8)
 LATE = "late.torque."
 """How the names of its numbers begin."""
 KNOWN = "kept", "mean", "moment"
-"""What is told of how late a torque is all components of which near what is asked for alike: in the end of a period, in its
-mean, and in that by the time that is left."""
+"""The numbers of a torque whose components all approach the command alike: the share of its error that is left at the end of
+a period, in its mean, and in the mean weighted by the time that is left."""
 WITHIN = f"{LATE}most"
 """How far the torque that acts may be off, of one that follows otherwise beyond."""
 

@@ -14,7 +14,7 @@ from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
 FAR = 1 << 100
-"""What bounds that settle do not exceed."""
+"""The largest bound that may settle."""
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
 SPEED, ANGLE, PULL, LOAD = "|w", "|q", "|u", "|j"
 """Under which the sizes have those of |w| and |q|, of the acceleration that is linear in the state where it is known, and in
