@@ -50,7 +50,7 @@ def assumption(identifier: str) -> Assumption:
 
         def late(span: Any) -> Unmet:
             off = np.linalg.norm(span["torque"] - span["command"], axis=1)
-            # Only as the flight begins: what it becomes follows.
+            # Tested only as the flight begins; later errors follow.
             return [(off[:1] > most * MORE, "the torque that acts is further from the command")]
 
         return Assumption(f"a torque that acts within {most:.4g} N m of the command at the start", late)

@@ -110,8 +110,8 @@ class Claim:
 
 
 WITHOUT, ORBIT, UNTIL, LATE = "without:", "orbit-within:", "until:", "late:"
-"""Begin the identifiers of the assumptions that a part is not there, role and name, that forces move the orbit by no more
-than a share, and that a flight has not lasted longer (s)."""
+"""The prefixes of the identifiers of assumptions: that a part, role and name, is absent; that forces move the orbit by at
+most a share; that a flight has not lasted longer (s); and that the torque is at first no further from the command (N m)."""
 STEADY = "steady-target"
 """The assumption that the target does not jump."""
 BESIDE = ("sampling", "control-limit", "saturated-axis", "detumbling")
@@ -152,7 +152,7 @@ class Certificate:
 
     @property
     def no_larger_start(self) -> str:
-        """Why the claim about the loop as it flies is about no larger start; empty where the largest tried is in it."""
+        """Why the claim about the loop as it flies has no larger start set; empty where the largest one tried is in it."""
         return str(self.subject.get("no_larger_start", ""))
 
     @property
