@@ -302,5 +302,5 @@ def test_what_momentum_adds_to_the_torque_and_to_the_drift_of_the_rates_is_in_th
 
 def test_a_vector_whose_size_is_not_told_is_not_taken_for_zero():
     assert felt([var("w1")], "r", {}) == 0
-    with pytest.raises(RefusedError, match="is not told"):
+    with pytest.raises(RefusedError, match="is not stated"):
         felt([var("h1") * var("w1")], "w", {"h1": Fraction(1)})

@@ -328,7 +328,7 @@ def test_a_claim_is_compared_with_the_plan_of_the_loop():
     assert differences(claim, loop) == []
     changes = {
         "the law plans its moves": without("taken", "plan"),
-        "plan.limit is not told": without("subject", "plan.limit"),
+        "plan.limit is not stated": without("subject", "plan.limit"),
         "plan.gap is exceeded": scaled("numbers", "plan.gap", rational("1/2")),
         "plan.stiffness is exceeded": scaled("numbers", "plan.stiffness", rational("1/2")),
         "plan.state.1 is another number": scaled("subject", "plan.state.1", 2),

@@ -149,9 +149,9 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         yield "the limit is one of another kind"
     if wheeled:
         if loop.limit != "none" and isfinite(most["limit"]) and numbers.keys().isdisjoint(("limit", "limit.norm")):
-            yield "the limit is not told"
+            yield "the limit is not stated"
         yield from (
-            f"{name} is not told"
+            f"{name} is not stated"
             for name, x in most.items()
             if "." in name and name[0] in "ms" and isfinite(x) and name not in numbers
         )
@@ -182,7 +182,7 @@ def _planned(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if PLANNED not in claim["taken"]:
         yield "the law plans its moves"
     yield from (
-        f"{name} is not told" for name in recorded.subject if name.startswith("plan.") and name not in claim["subject"]
+        f"{name} is not stated" for name in recorded.subject if name.startswith("plan.") and name not in claim["subject"]
     )
     try:
         numbers, _ = told_of(recorded, plan)

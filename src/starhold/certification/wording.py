@@ -272,13 +272,13 @@ def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 def _detumbling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "rates" not in n:
-        return "the energy falls where the magnetic field turns in the body"
+        return "the energy decreases where the magnetic field turns in the body"
 
-    # Rates between, by how much the energy rises and for how long the field turns fast are in the certificate.
+    # Rates between, by how much the energy increases and for how long the field turns fast are in the certificate.
     ends = sorted({0, len(n["rates"]) - 1})
     falls = [f"{speed(n['turning'][k], True)} up to {speed(n['rates'][k])}" for k in ends]
     return (
-        f"energy falls in each control period in which the field turns in the body by over {', '.join(falls)}; field ≥"
+        f"energy decreases in each control period in which the field turns in the body by over {', '.join(falls)}; field ≥"
         f" {shown(n['field'], ' T', True)}, changing ≤ {shown(100.0 * n['field_change'], ' %')}/s; torques ≤"
         f" {shown(n['torque'], ' N m')}, across it {shown(n['torque_across'], ' N m')}"
     )

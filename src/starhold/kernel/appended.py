@@ -134,7 +134,7 @@ class Appended:
     def misread(self) -> Column:
         """Return the bounds of the measurement errors of the state."""
         turned, rate = (self.numbers.get(f"error.{name}") or ZERO for name in ("attitude", "rate"))
-        demand(turned <= HALF, "an attitude is told too wrongly")
+        demand(turned <= HALF, "the error of the measured attitude is too large")
         return [*[rate] * 3, *[turned / 2] * 3, *[ZERO] * self.count]
 
     def push(self, name: str, state: Column) -> Fraction:

@@ -134,7 +134,7 @@ def outweighed(Q: Rows, c: Fraction, F: Rows, M: Rows) -> Rows:
 def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
     """Return a bound, in norms, of how much expressions change with a vector; zero for one that occurs in none of them."""
     names = [name for name in sizes if name[0] == letter]
-    demand(all(name in names for p in parts for name in p.names if name[0] == letter), "how large a vector is is not told")
+    demand(all(name in names for p in parts for name in p.names if name[0] == letter), "the size of a vector is not stated")
     if not names:
         return Fraction(0)
     rows, turned = taken_apart(tuple(tuple(p.slope(name) for name in names) for p in parts))

@@ -67,7 +67,7 @@ def detumbles(claim: Claim) -> Proof:
             f"at up to {below(rate)} rad/s above {above(least)} rad/s, and else rises by {above(rise)} W at most, so that it"
             f" is above {above(often)} rad/s for at most {above(spell)} s and {above(share)} of the time"
         )
-    demand(bool(texts), "no rate is told")
+    demand(bool(texts), "no rate is stated")
     wheels = f"wheels that keep up to {below(numbers['stored'])} N m s, " if loop.wheels else ""
     text = (
         "in each control period the kinetic energy falls where the field turns in the body, in the mean of it and the one"

@@ -96,12 +96,12 @@ def points(claim: Claim) -> Proof:
     if SHARE in numbers:
         noise = yield from within_radii(claim, motion)
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
-    demand(bool(levels), "no level is told")
+    demand(bool(levels), "no level is stated")
     within = [(Fraction(0), tube.sizes[ANGLE])]
     for k, one in enumerate(levels):
         end, tau, beta = map(rational, read_table(one, "end", "tau", "beta"))
         Q, H, F, push, rest, spare = motion.fall(tube)
-        demand(tau > 0 and 0 < h * beta <= spare and 0 < end < c, "a level is not properly told")
+        demand(tau > 0 and 0 < h * beta <= spare and 0 < end < c, "a level is not properly stated")
         pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(F), F), -tau), H, -beta)
         yield f"V decreases by a share {k}", Definite(fallen)
@@ -124,7 +124,7 @@ def points(claim: Claim) -> Proof:
             map(rational, rest),
         )
         free = 1 - sum(shares, Fraction(0))
-        demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
+        demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly stated")
         left = plus([[rate * x for x in row] for row in X], spread(shares, motion.linear(tube)), -1)
         for corner, A in enumerate(corners):
             yield f"ellipsoid {k} {corner}", Definite(plus(left, times(A, times(X, transpose(A))), Fraction(-1) / free))
