@@ -120,10 +120,7 @@ def _filled(span: Any) -> Unmet:
 
 def _friction(span: Any) -> Unmet:
     wheels = span.loop.wheels
-    return [
-        (has_friction(wheels), "the wheels have friction"),
-        (bool(wheels.unbalanced), "the rotors are out of balance"),
-    ]
+    return [(has_friction(wheels), "the wheels have friction"), (bool(wheels.unbalanced), "the rotors are out of balance")]
 
 
 def _strayed(span: Any) -> Unmet:

@@ -75,7 +75,7 @@ OBLIGATIONS = {
     "deviation of the spun turn": "and the angle's",
     "deviation of the spun torque": "and the torque's",
     "share": "all samples of an orbit are within these errors with the stated probability",
-    "energy falls": "the energy decreases where the field turns in the body as fast as claimed, with rods within their limit",
+    "energy falls": "the energy decreases where the field turns in the body as fast as claimed, with rods within limits",
     "energy falls at the limit": "and with rods at their limit",
     "energy falls by a part": "where it turns faster the energy decreases by as much as claimed",
     "energy falls by a part at the limit": "and with rods at their limit too",

@@ -87,10 +87,6 @@ class Intervals:
         roots = _outward(np.sqrt(np.maximum(self.low, 0.0)), np.sqrt(np.maximum(self.high, 0.0)))
         return Intervals(np.maximum(roots.low, 0.0), roots.high)
 
-    def clipped(self, low: float, high: float) -> Intervals:
-        """Return the intersection with low .. high, for numbers that are known to lie there."""
-        return Intervals(np.clip(self.low, low, high), np.clip(self.high, low, high))
-
 
 def _read(value: Any) -> Intervals:
     return value if isinstance(value, Intervals) else Intervals(value)

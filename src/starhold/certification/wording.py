@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -170,10 +170,6 @@ def _followed(subject: Mapping[str, Any]) -> str:
     return ", while the target follows the rotation spline through its history" if followed else ""
 
 
-def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    return f"{place(n, subject)} the body comes to rest on target{_cover(n, subject)}".strip()
-
-
 def _hand_over(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     def most(value: float, unit: str) -> str:
         # Without the rounding of the law's own comparison.
@@ -292,18 +288,10 @@ def _circles(n: Mapping[str, Any]) -> str:
     return f"from the level set of V that holds {band} and, {off},"
 
 
-def _circle(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    return f"{_circles(n)} the motion ends on the circle".strip()
-
-
 def _control_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     kind = "on every axis" if n["kind"] == "axis" else "in norm"
     limit = shown(n["limit"], " (scaled)", up=not n["refuted"])
     return f"{_circles(n)} with x = 0, the control never exceeds {limit} {kind}".strip()
-
-
-def _equilibrium(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    return "from everywhere the motion comes to rest where it is wanted"
 
 
 def _saturated_axis(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -317,8 +305,8 @@ def _saturated_axis(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     )
 
 
-_SENTENCES = {
-    "convergence": _convergence,
+_SENTENCES: Mapping[str, Callable[[Mapping[str, Any], Mapping[str, Any]], str]] = {
+    "convergence": lambda n, subject: f"{place(n, subject)} the body comes to rest on target{_cover(n, subject)}".strip(),
     "hand-over": _hand_over,
     "region": _region,
     "torque-limit": _torque_limit,
@@ -328,9 +316,9 @@ _SENTENCES = {
     "sampling": _sampling,
     "sliding": _sliding,
     "detumbling": _detumbling,
-    "circle": _circle,
+    "circle": lambda n, subject: f"{_circles(n)} the motion ends on the circle".strip(),
     "control-limit": _control_limit,
-    "equilibrium": _equilibrium,
+    "equilibrium": lambda n, subject: "from everywhere the motion comes to rest where it is wanted",
     "saturated-axis": _saturated_axis,
 }
 

@@ -39,8 +39,7 @@ class Distribution(Table):
     """Whether values have bounds, whatever the parameters are."""
 
     judged_apart: Annotated[
-        Flag,
-        Field(description="known before flight, such as the launch date: runs of similar values are judged separately"),
+        Flag, Field(description="known before flight, such as the launch date: runs of similar values are judged separately")
     ] = False
     known_to_law: Annotated[
         Flag, Field(description="whether laws know and are designed for the drawn value, not the file's")
