@@ -1,5 +1,5 @@
 """What drives a loop by a claim, as another reader has it: errors of noise, the motion that they cause in the linear loop,
-fleets of flights under all that acts."""
+and fleets of flights under all that acts."""
 
 import math
 from functools import cached_property

@@ -238,8 +238,7 @@ class Standing:
     of the law's nominal model; true: "given" with the true one it was made for, "any", or "box" with those whose entries
     differ by at most `tolerance` sqrt(J_ii J_jj); limit: "given", "any" or "above", which is that limit or a larger one;
     momentum: whether with any angular momentum at the start; start: the level of V below which the start must be, None for
-    any start.
-    """
+    any start."""
 
     known: bool
     true: str

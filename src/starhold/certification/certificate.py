@@ -1,7 +1,6 @@
 """A certificate holds its loop, claims as numbers, and for each claim the obligations and their proofs. Sentences are made
 from the numbers when they are displayed (`wording`), so that nothing in the file can say more than the independent checker
-verifies.
-"""
+verifies."""
 
 from __future__ import annotations
 
@@ -59,8 +58,7 @@ class Proof:
 @dataclass(frozen=True, repr=False)
 class Claim:
     """`kind` names the claim, `numbers` quantify it, in SI units; None means unbounded. `witness`: numbers of the proof that
-    a checker needs. `proof`: the proof that the kernel has checked; without one nothing is decided.
-    """
+    a checker needs. `proof`: the proof that the kernel has checked; without one nothing is decided."""
 
     kind: str
     numbers: dict[str, Any]

@@ -303,8 +303,7 @@ def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool
 
 def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | None]:
     """Read the declared bounds of a part's torque and of its error of the command; for a part that could be left out only
-    finite ones.
-    """
+    finite ones."""
     part = fitted.part
     acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
     # The claim's numbers bound the torques that laws know, and are about the gravity gradient alone.

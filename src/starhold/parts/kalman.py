@@ -71,8 +71,7 @@ class Gains(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """The gains for the residual of an attitude, which give the new covariances; those for the actual residual, and
-    this."""
+    """The gains for the residual of an attitude, which give the new covariances; those for the actual residual, and this."""
 
     whole: Gains
     gain: Gains

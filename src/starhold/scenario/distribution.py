@@ -1,8 +1,7 @@
 """The interface of distributions. Each maps uniform numbers to values, so random, Sobol and Latin hypercube samples work
-with all of them. Parameters stay as in the file until `read` replaces them by numbers in the key's unit.
-Every `draw` takes uniforms u (dims, n) strictly between 0 and 1 and returns values (width, n). Each value depends, to the
-last bit, only on its own column of u, so a campaign may be split into chunks anywhere.
-"""
+with all of them. Parameters stay as in the file until `read` replaces them by numbers in the key's unit. Every `draw` takes
+uniforms u (dims, n) strictly between 0 and 1 and returns values (width, n). Each value depends, to the last bit, only on its
+own column of u, so a campaign may be split into chunks anywhere."""
 
 from __future__ import annotations
 

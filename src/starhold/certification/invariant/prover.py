@@ -1,6 +1,5 @@
 """Finds evidence for the kernel's theorems on a function V: hints, the largest level, sums of squares. Nothing here is
-trusted: evidence counts once the kernel has accepted it.
-"""
+trusted: evidence counts once the kernel has accepted it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
