@@ -8,6 +8,7 @@ import numpy as np
 import starhold as sh
 from starhold.analysis.departure import start_inside
 from starhold.errors import InputError
+from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.scenario.building import build
 from starhold.scenario.writing import part_table
@@ -119,4 +120,7 @@ def _beyond(loop, claim, changed):
 
 
 def _acts(fitted):
-    return fitted.part.role not in ("environment",) or fitted.part.name not in ("two-body", "gravity-gradient")
+    """Whether a part does more than hold the orbit, pull as laws are told, or show what no law reads by itself."""
+    if fitted.part.role == "sensor":
+        return bool({*fitted.part.module.Reading._fields} & {*State._fields})
+    return fitted.part.name not in ("two-body", "gravity-gradient")
