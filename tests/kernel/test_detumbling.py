@@ -22,7 +22,7 @@ from starhold.kernel.check import check
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.programs import digest
-from starhold.kernel.theorems.detumbling import power_at, value
+from starhold.kernel.theorems import detumbling
 from starhold.laws import b_dot
 from starhold.loop.modes import loop_of_mode
 from starhold.parts.contract import NoParams, Push
@@ -206,8 +206,8 @@ def power_of(content):
     claim = content["claims"][0]
     loop = AttitudeLoop(read(claim, content["programs"]), quotients=True)
     numbers, h = loop.claim.numbers, loop.claim.subject["measurement.period"]
-    others = power_at(loop, numbers["rate.0"]).others
-    return (value(others, 0) - numbers["rate.0"] * numbers["outside"]) / (h * numbers["outside.across"])
+    others = detumbling.power_at(loop, numbers["rate.0"]).others
+    return (detumbling.value(others, 0) - numbers["rate.0"] * numbers["outside"]) / (h * numbers["outside.across"])
 
 
 def led(measurement, gains, craft, memory):

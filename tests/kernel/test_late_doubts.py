@@ -42,9 +42,10 @@ def plain():
 
 class Lagging:
     """A loop with a lag (s), and a law -K q - c (q1^3, q2^3, q3^3) - C w + w x Jw: K and C are a number, or one for each
-    axis. `held`: the stiffness of a V, in place of K, that has no cross term."""
+    axis. `held`: the stiffness of a V, in place of K, that has no cross term; `errors`:
+    numbers of the claim."""
 
-    def __init__(self, J, h, lag, stiff, damped, cubic=0.0, *, held=None, alike=True, **late):
+    def __init__(self, J, h, lag, stiff, damped, cubic=0.0, *, held=None, alike=True, errors=(), **late):
         Account.left = 10**13
         self.J, self.h, self.lag, self.kept = J, h, lag, np.exp(-h / lag)
         told = {"kept": self.kept * (1 + 1e-9), "mean": lag / h * (1 - self.kept) * (1 + 1e-9)}
@@ -52,7 +53,7 @@ class Lagging:
         if alike:
             told["moment"] = lag / h * (1 - told["mean"]) * (1 + 2e-9)
             told |= {f"{name}.least": told[name] * (1 - 4e-9) for name in ("kept", "mean", "moment")}
-        n = {"period": h, "outside": 1e-14, "error": 1e-14} | {f"outside.{k}": 1e-14 for k in range(3)}
+        n = {"period": h, "outside": 1e-14, "error": 1e-14} | {f"outside.{k}": 1e-14 for k in range(3)} | dict(errors)
         base, own = plain()
         claim = own.claim(own.leans[0][1], n | {f"late.torque.{name}": x for name, x in (told | late).items()})
         inertia = {f"body.inertia.{i}.{k}": str(Fraction(float(J[i, k]))) for i in range(3) for k in range(i, 3)}

@@ -1,5 +1,5 @@
-"""Terms of what is late in a period: each is needed, for without it some period exceeds the bound, or more is paid than there
-is to pay with."""
+"""Terms of what is late in a period: each is needed, for without it some period exceeds the bound, or more is paid than
+there is to pay with."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -12,28 +12,31 @@ from scipy.linalg import null_space
 from starhold.certification.evidence.claims import floats
 from starhold.kernel.follower import FIRST, REST, Change, Costs, Follower, Late
 from starhold.kernel.regions import RATE
-from tests.kernel.flights import along
+from tests.kernel.flights import along, moved, turned_on
 from tests.kernel.test_dropped_terms import LANES, Flight, quiet
 from tests.kernel.test_late_doubts import AXES, BALL, Lagging
 
 SHARP, SMALL = [1.0, 1e-4, 1e-4], 1e-6
 ALONE = {
     # The slope of what the law asks for is that far from the target, where this turns on.
-    "turned": (Lagging(BALL, 5e-4, 5e-4, 1e-2, 0.05, 3.3e6), 2e-8, 0.5),
+    "turned": ((BALL, 5e-4, 5e-4, 1e-2, 0.05, 3.3e6), None, 2e-8),
     # What makes up for w x Jw changes with the rates, and these do in proportion to the state.
-    "spun": (Lagging(AXES, 5e-3, 5e-3, SMALL, 1e-3, held=1.0), 0.2, 0.2),
+    "spun": ((AXES, 5e-3, 5e-3, SMALL, 1e-3), 1.0, 0.2),
     # The body turns about another axis than its rate's, and about that the law is stiff.
-    "aside": (Lagging(BALL, 5e-3, 5e-3, SHARP, 1e-3, held=0.1), 0.1, 0.3),
+    "aside": ((BALL, 5e-3, 5e-3, SHARP, 1e-3), 0.1, 0.1),
 }
-"""Loops of which one term of the bound is nearly all, a level, and what part of the bound a period comes to."""
+"""Loops of which one term of the bound is nearly all, the stiffness of V, and a level."""
 
 
+@pytest.mark.parametrize("near", [False, True])
+@pytest.mark.parametrize("alike", [True, False])
 @pytest.mark.parametrize("term", ALONE)
-def test_how_far_what_is_asked_for_changes_is_in_one_term_of_the_bound(term):
-    loop, level, least = ALONE[term]
-    assert least < loop.changed(level, 1e-12, False) <= 1.0
+def test_how_far_what_is_asked_for_changes_is_in_one_term_of_the_bound(term, alike, near):
+    numbers, held, level = ALONE[term]
+    assert 0.15 < Lagging(*numbers, held=held, alike=alike).changed(level, 1e-12, near) <= 1.0
 
 
+@pytest.mark.slow
 def test_what_momentum_makes_of_rates_changes_what_is_asked_for():
     """Of states that change nothing linearly without momentum."""
     told = dict.fromkeys((f"late_torque_{name}" for name in ("kept", "mean", "weight", "begun", "rest")), 0.1)
@@ -49,12 +52,33 @@ def test_what_momentum_makes_of_rates_changes_what_is_asked_for():
     assert 0.2 < share.max() <= 1.0
 
 
-T = (np.arange(4000) + 0.5) / 4000
+ERRORS = {"error": 2e-4, "error.attitude": 1e-2, "error.rate": 2e-3}
+
+
+@pytest.mark.parametrize("name", ERRORS)
+@pytest.mark.parametrize("alike", [True, False])
+def test_errors_that_turn_over_change_what_is_asked_for_by_twice_as_much(name, alike):
+    loop = Lagging(BALL, 0.1, 0.1, 0.02, 0.2, alike=alike, errors={name: ERRORS[name]})
+    tube, axis = loop.tube(1e-14, 0.0), np.eye(3)[:, :1]
+    error, turn, rate = (ERRORS[one] * (one == name) for one in ERRORS)
+
+    def asked(q, w, sign):
+        return loop.asked(turned_on(q, sign * turn * axis), w + sign * rate * axis) - sign * error * axis
+
+    q, w, inverse = np.eye(4)[:, :1], 0.0 * axis, np.linalg.inv(loop.J)
+    begun = asked(q, w, 1.0)
+    late = np.linalg.norm(asked(*moved(loop.J, inverse, q, w, begun, loop.h), -1.0) - begun)
+    near, errors = float(sum(loop.held.lateness(tube))), 2.0 * float(loop.held.mistaken(tube)) * alike
+    for most in (float(loop.held.change_in(tube).rest), (1.0 - loop.kept) * (near - errors) + errors):
+        assert 0.9 * most < late <= most
+
+
+TIMES = (np.arange(4000) + 0.5) / 4000
 FALLING = [
-    lambda c: np.where(T < c, 1.0, 0.0),
-    lambda c: np.full(T.shape, c),
-    lambda c: (1.0 - T) ** (1.0 / c - 1.0),
-    lambda c: np.where(T < c / 2.0, 1.0, c / (2.0 - c)),
+    lambda c: 1.0 * (c > TIMES),
+    lambda c: np.full(TIMES.shape, c),
+    lambda c: (1.0 - TIMES) ** (1.0 / c - 1.0),
+    lambda c: np.where(c / 2.0 > TIMES, 1.0, c / (2.0 - c)),
 ]
 """Shares of a torque that are left in a period, with a mean of c."""
 
@@ -63,11 +87,11 @@ FALLING = [
 def test_torques_that_stand_for_one_that_is_late_do_no_less_and_hardly_more(c):
     late, begin, end, moved = Late(*map(Fraction, (0, c, 1, 0, 0))), 0.0, 0.0, 0.0
     for left in (shape(c) for shape in FALLING):
-        rates, moment = np.cumsum(left) / len(T), 2.0 * np.mean((1.0 - T) * left)
-        begin, end = max(begin, moment), max(end, 2.0 * np.mean(T * left))
-        moved = max(moved, *(np.mean(x * rates) / np.mean(x * T) for x in (1.0, T, 1.0 - T)))
+        rates, moment = np.cumsum(left) / len(TIMES), 2.0 * np.mean((1.0 - TIMES) * left)
+        begin, end = max(begin, moment), max(end, 2.0 * np.mean(TIMES * left))
+        moved = max(moved, *(np.mean(x * rates) / np.mean(x * TIMES) for x in (1.0, TIMES, 1.0 - TIMES)))
         # Beside an even growth to what is left in the end there is one that stands for the rest.
-        beside = [np.mean(x * (rates - c * T)) / np.mean(x * T) for x in (T, 1.0 - T)]
+        beside = [np.mean(x * (rates - c * TIMES)) / np.mean(x * TIMES) for x in (TIMES, 1.0 - TIMES)]
         assert max(beside) <= 2.0 * moment - 2.0 * c + 1e-3
     for most, share in zip((*late.ends, late.moved), (begin, end, moved), strict=True):
         assert 0.6 * float(most) < share <= float(most) + 1e-3

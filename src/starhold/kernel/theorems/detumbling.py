@@ -55,7 +55,7 @@ def detumbles(claim: Claim) -> Proof:
         power = power_at(loop, rate)
         if "limit" in numbers:
             yield f"limit {k}", Exceeds(numbers["limit"], loop.claim.subject["gains.k"] * (rate + numbers["field.change"]))
-        # The signs last beyond m: but for m^2 no coefficient of `free` or `seen` is negative, and none of `limited` positive.
+        # These signs last beyond m: but for m^2 no coefficient of `free` is negative, and none of `limited` positive.
         for name, m, c in (("falls", least, Fraction(0)), ("falls by a part", often, fall)):
             yield f"energy {name} {k}", Exceeds(-value(power.free, m), c)
             yield f"energy {name} at the limit {k}", Exceeds(value(power.limited, m), c * value(power.seen, m))
