@@ -98,6 +98,7 @@ class Claim:
         """Return the conditions under which it is about a flight up to a time (s); empty where there are none."""
         end = min(self.numbers_of(UNTIL), default=inf)
         about = [f"the flight lasts {end:.6g} s at most"] * (end < until)
+        about += ["directions give an attitude all the time"] * bool(self.numbers_of(FRESH))
         return " and ".join(["the target does not jump"] * (STEADY in self.assumptions) + about)
 
     def angle_from(self, time: float) -> float:
@@ -109,9 +110,10 @@ class Claim:
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
-WITHOUT, ORBIT, UNTIL, LATE = "without:", "orbit-within:", "until:", "late:"
+WITHOUT, ORBIT, UNTIL, LATE, FRESH = "without:", "orbit-within:", "until:", "late:", "fresh:"
 """Begin the identifiers of the assumptions that a part is not there, role and name, that forces move the orbit by no more
-than a share, and that a flight has not lasted longer (s)."""
+than a share, that a flight has not lasted longer (s), that the torque that acts is no further from the command at the start
+(N m), and that directions gave an attitude no longer ago (s)."""
 STEADY = "steady-target"
 """The assumption that the target does not jump."""
 BESIDE = ("sampling", "control-limit", "saturated-axis", "detumbling")

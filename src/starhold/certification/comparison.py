@@ -24,8 +24,8 @@ from starhold.certification.unmodelled import (
     GROWING,
     Pushes,
     change_of_modelled,
+    gaussian_vectors,
     late_torque,
-    noisy_fields,
     samples_of,
 )
 from starhold.kernel.follower import KNOWN, LATE
@@ -109,7 +109,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
     if "share" in numbers and (driven := driven_errors(loop)) is not None:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
-        exactly[VECTORS] = noisy_fields(loop)
+        exactly[VECTORS] = gaussian_vectors(loop)
         numbers |= {} if VECTORS in numbers or BESIDE not in numbers else {VECTORS: Fraction(1)}
     if claim["theorem"] in BOUNDED:
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
