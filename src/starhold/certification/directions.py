@@ -9,7 +9,7 @@ from starhold.certification.certificate import FRESH
 from starhold.certification.orbit_band import band_of, extremes
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts import magnetic_field
-from starhold.parts.contract import Direction, Errors, Noise, Place, Sky
+from starhold.parts.contract import Direction, Errors, Noise, Sky
 from starhold.parts.part import Fitted
 from starhold.parts.vectors import KINDS
 
@@ -49,8 +49,7 @@ def directed(loop: ClosedLoop, estimator: Fitted) -> Directed | None:
     places = [f for f in sensors if "position" in shown(f)][:1]
     seeing = [f for f in sensors if shown(f) & names.keys()]
     if not hasattr(module, "SEVERAL"):
-        firsts = (next((f for f in seeing if name in shown(f)), None) for name in names)
-        seeing = [f for f in firsts if f is not None]
+        seeing = [f for name in names for f in [one for one in seeing if name in shown(one)][:1]]
     alike = all(
         getattr(f.params, name, own) == own
         for f in seeing
@@ -60,10 +59,10 @@ def directed(loop: ClosedLoop, estimator: Fitted) -> Directed | None:
     tells: list[Any] = [f.part.hook("direction") for f in seeing]
     tell_places: list[Any] = [f.part.hook("place") for f in places]
     sky = sky_of(loop, estimator.params.epoch) if alike and None not in (*tells, *tell_places) else None
-    if sky is None or loop.period > LONGEST:
+    if sky is None or loop.period > LONGEST or not places:
         return None
-    where = [tell(f.params, sky) for tell, f in zip(tell_places, places, strict=True)] or [Place(0.0, 0)]
-    off = where[0].error
+    (where,) = (tell(f.params, sky) for tell, f in zip(tell_places, places, strict=True))
+    off: float = where.error
     moved = {"field": off * sky.turning, "nadir": off / sky.distance}
     seen: list[Direction] = [tell(f.params, loop.period, sky) for tell, f in zip(tells, seeing, strict=True)]
     seen = [one._replace(error=one.error + moved.get(one.of, 0.0)) for one in seen]
@@ -76,14 +75,14 @@ def directed(loop: ClosedLoop, estimator: Fitted) -> Directed | None:
         combined[0],
         combined[1],
         tuple(dict.fromkeys((*seeing, *places))),
-        where[0].gaussian + sum(d.deviation > 0.0 for d in seen),
+        where.gaussian + sum(d.deviation > 0.0 for d in seen),
     )
 
 
 def freshness(loop: ClosedLoop) -> list[str]:
     """Return the assumption that directions give the attitude of a loop's estimator as often as its sensors have them; none
     where it is another one or is not bounded."""
-    fixes = [directed(loop, f) for f in loop.used("estimator") if is_directed(f)]
+    fixes = [directed(loop, f) for f in loop.used("estimator")[:1] if is_directed(f)]
     return [f"{FRESH}{(fix.noise.every - 1) * loop.period!r}" for fix in fixes if fix is not None]
 
 

@@ -96,8 +96,9 @@ def measured(loop: ClosedLoop) -> Measured | None:
     if loop.target.part.flag("BY_MODE"):
         return None
     estimators = loop.used("estimator")
-    fix, by_directions = None, any(map(is_directed, estimators))
-    if by_directions and (fix := directed(loop, estimators[0])) is None:
+    by_directions = bool(estimators) and is_directed(estimators[0])
+    fix = directed(loop, estimators[0]) if by_directions else None
+    if by_directions and (fix is None or len(estimators) > 1):
         return None
     wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
     wanted = {"rate"} if by_directions else wanted
@@ -110,9 +111,9 @@ def measured(loop: ClosedLoop) -> Measured | None:
         [(noise_of(f, loop.period), bound) for f, bound in zip(sensors, bounds, strict=True) if name in shown(f)]
         for name in ("attitude", "rate")
     )
-    wider, gaussian = 1.0, 0
+    wider, gaussian = 1.0, sum(bound.gaussian for bound in bounds if bound is not None)
     if fix is not None:
-        attitudes, wider, gaussian = [(fix.noise, fix.errors)], WIDER, fix.gaussian
+        attitudes, wider, gaussian = [(fix.noise, fix.errors)], WIDER, gaussian + fix.gaussian
         sensors = (*sensors, *(f for f in fix.sensors if f not in sensors))
     every = {noise.every for noise, _ in attitudes}
     if len(rates) > 1 or len(every) > 1 or (len(attitudes) > 1 and "attitude" not in several):
@@ -123,13 +124,13 @@ def measured(loop: ClosedLoop) -> Measured | None:
         noise = noise._replace(attitude=first.attitude, every=first.every, more=others)
     for reading, _ in rates:
         noise = noise._replace(rate=reading.rate, walk=reading.walk)
-    random = is_random(noise) or gaussian > 0
+    random = is_random(noise, NO_ERRORS._replace(gaussian=gaussian))
     if wider > 1.0:
         wide = diagonal((wider, wider, wider))
         noise = noise._replace(attitude=multiply(wide, noise.attitude), rate=wider * noise.rate)
     if not estimators:
         amiss = reduce(Told.__add__, (as_read(bound) for bound in bounds if bound is not None))
-        return Measured(amiss, _as_read(noise), sensors, True) if random and not noise.walk else None
+        return Measured(amiss, _as_read(noise), sensors, True, 1.0, gaussian) if random and not noise.walk else None
     tell: Any = estimators[0].part.hook("recursion")
     if tell is None:
         return None
@@ -163,9 +164,9 @@ def noise_of(fitted: Fitted, period: float) -> Noise:
     return Noise() if tell is None else tell(fitted.params, period)
 
 
-def is_random(noise: Noise) -> bool:
-    """Return whether a reading has an unbounded error."""
-    return any(leaves(noise._replace(every=0)))
+def is_random(noise: Noise, errors: Errors | None = None) -> bool:
+    """Return whether a reading has an unbounded error, or one that has a bound but for a share of times."""
+    return any(leaves(noise._replace(every=0))) or (errors is not None and errors.gaussian > 0)
 
 
 def tells_place(fitted: Fitted) -> bool:

@@ -126,8 +126,8 @@ def _told(loop: ClosedLoop) -> list[tuple[tuple[Fitted, ...], Told]]:
     amiss = [] if result is None else [(together, result.amiss)]
     for f in _acting(loop):
         # A part that is left out for its noise is left out with its other errors.
-        errors = None if f in together or is_random(noise_of(f, loop.period)) else bounded(f, loop.period)
-        amiss += [] if errors is None else [((f,), as_read(errors))]
+        errors = None if f in together else bounded(f, loop.period)
+        amiss += [] if errors is None or is_random(noise_of(f, loop.period), errors) else [((f,), as_read(errors))]
     return amiss
 
 

@@ -47,7 +47,8 @@ class Errors(NamedTuple):
     error that a filter removes. Beside them errors may grow with the motion: `turning`, of the attitude with the body's
     rate (s); `turned`, of the rate with that (1); and `late`, of the rate with the body's acceleration (s). They are those
     of the last `ago` seconds, in the state of which before the start nothing changed, on a body that turns by no more
-    than 2 rad in a control period."""
+    than 2 rad in a control period. gaussian: how many Gaussian vectors they depend on at each reading, which are no longer
+    than they are assumed to be."""
 
     attitude: float = 0.0
     rate: float = 0.0
@@ -57,6 +58,7 @@ class Errors(NamedTuple):
     turned: float = 0.0
     late: float = 0.0
     ago: float = 0.0
+    gaussian: int = 0
 
     @property
     def grow(self) -> bool:

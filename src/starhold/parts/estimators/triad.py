@@ -90,7 +90,8 @@ def triad(first: Vector, second: Vector, sine_squared: Scalar) -> tuple[Matrix, 
 
 
 def combined(params: Params, seen: tuple[Direction, ...]) -> tuple[Errors, Noise] | None:
-    """Return errors and noise of the attitude from these directions of Sun and field; None for too large errors.
+    """Return errors and noise of the attitude from these directions of Sun and field; None for too large errors,
+    and without either.
 
     Let s and b be the true unit vectors, a their angle, u = s x b/sin a; s' and b' the measured ones, those of s + x and
     b + y, and a' their angle, no less than `apart` from 0 and half a turn. The estimate is the shortest rotation from s to
@@ -105,6 +106,8 @@ def combined(params: Params, seen: tuple[Direction, ...]) -> tuple[Errors, Noise
     vector part c sin D/2 cos P/2 + s' cos D/2 sin P/2 + s' x c sin D/2 sin P/2. Twice this is D c + P s but for
     3/2 D P + (D^3 + P^3)/24 + D P (D + P)/8, and its rotation vector but for T^3/24 more, T^2 = D^2 + P^2. D c is s x x but
     for D^3/6 + |x|^2/(1 - |x|)."""
+    if {one.of for one in seen} != {"sun", "field"}:
+        return None
     sun, field = sorted(seen, key=lambda one: one.of, reverse=True)
     x, y = sun.most, field.most
     if not max(x, y) < 0.5 or not (reach := math.asin(x) + math.asin(y)) < params.apart:

@@ -66,8 +66,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 def place(params: Params, sky: Sky) -> Place:
     """Return how far off the position is, by noise and by the way that the craft goes until a reading arrives."""
-    late = params.delay + DEVIATIONS * params.jitter
-    error = DEVIATIONS * params.position + sky.speed * late
+    error = DEVIATIONS * params.position + sky.speed * as_built.latest(params.delay, params.jitter)
     return Place(error, (params.position > 0.0) + (params.jitter > 0.0))
 
 
