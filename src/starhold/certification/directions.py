@@ -51,10 +51,10 @@ def directed(loop: ClosedLoop, estimator: Fitted) -> Directed | None:
     if not hasattr(module, "SEVERAL"):
         seeing = [f for name in names for f in [one for one in seeing if name in shown(one)][:1]]
     alike = all(
-        getattr(f.params, name, own) == own
+        getattr(f.params, name, assumed) == assumed
         for f in seeing
         for name in ("epoch", "ephemeris")
-        for own in [getattr(estimator.params, name)]
+        for assumed in [getattr(estimator.params, name)]
     )
     tells: list[Any] = [f.part.hook("direction") for f in seeing]
     tell_places: list[Any] = [f.part.hook("place") for f in places]

@@ -196,8 +196,8 @@ def _estimated(
     )
     hurried, late = (x + more for x, more in zip((hurried, late), later, strict=True))
     ago = steps * given[1] + max(one.ago for one in (*rates, *attitudes))
-    told = Told(attitude, rate, turned, hurried, rated, late, ago, kept)
-    return told if told.grows else told._replace(ago=0.0, kept=0.0)
+    amiss = Told(attitude, rate, turned, hurried, rated, late, ago, kept)
+    return amiss if amiss.grows else amiss._replace(ago=0.0, kept=0.0)
 
 
 @cache
