@@ -3,12 +3,15 @@
 import math
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.vector import Vector
 from starhold.analysis.departure import Span
 from starhold.certification.assumptions import assumption
 from starhold.certification.certificate import FRESH
@@ -159,6 +162,70 @@ def test_coarse_sun_sensors_are_left_out_but_not_where_the_estimator_does_not_re
     coarse = fit("sensor", "coarse-sun-sensors")
     assert measured(replace(loop, parts=(*loop.parts, coarse))) is not None
     assert measured(replace(loop, parts=(coarse, *loop.parts))) is None
+
+
+def with_module(loop, name, **changed):
+    """A loop with an own part that is another one but for these names."""
+    module = ModuleType(name)
+    vars(module).update({**vars(loop.find(name).part.module), **changed})
+    own = replace(loop.find(name).part, module=module)
+    return replace(loop, parts=tuple(replace(f, part=own) if f.part.name == name else f for f in loop.parts))
+
+
+def test_a_sensor_of_two_directions_that_tells_errors_of_one_is_left_out():
+    class Both(NamedTuple):
+        nadir: Vector
+        nadir_is_seen: float
+        sun: Vector
+        sun_is_seen: float
+
+    loop = loop_with("quest")[1]
+    assert measured(with_module(loop, "horizon-sensor")) is not None
+    assert measured(with_module(loop, "horizon-sensor", Reading=Both)) is None
+    other = {"direction": lambda params, period, sky: Direction("sun", 1e-3)}
+    assert measured(with_module(loop, "horizon-sensor", **other)) is None
+
+
+def test_an_own_estimator_that_does_not_tell_its_age_is_left_out():
+    class Ageless(NamedTuple):
+        attitude: Quaternion
+        rate: Vector
+        is_valid: float
+
+    loop = loop_with("triad")[1]
+    assert measured(with_module(loop, "triad")) is not None
+    assert measured(with_module(loop, "triad", Estimate=Ageless)) is None
+
+
+@pytest.mark.parametrize("sine", [1e-3, 0.3])
+def test_a_direction_is_further_from_another_by_the_angle_between_them(sine):
+    random, seen = np.random.default_rng(4), Direction("field", 0.1, 0.02)
+    moved = seen.beside(sine)
+    a = unit(random.normal(size=(1000, 3)))
+    side = across(a, random)
+    cosine = math.sqrt(1.0 - sine * sine)
+    for error in (0.1 * side, 0.1 * unit(random.normal(size=a.shape))):
+        off = np.linalg.norm((cosine * a + sine * side + error) / cosine - a, axis=1)
+        assert off.max() <= moved.error * (1.0 + 1e-12)
+    assert np.linalg.norm((cosine * a + sine * side + 0.1 * side) / cosine - a, axis=1).max() > moved.error * (1.0 - 1e-9)
+    assert moved.deviation == seen.deviation / cosine
+    assert seen.beside(1.0).error == math.inf
+
+
+@pytest.mark.parametrize("every", [2, 3, 7])
+def test_a_body_that_accelerates_between_readings_of_the_gyro_puts_a_carried_attitude_off(every):
+    """It turns to and fro, with each turn over when the gyro is read."""
+    loop, period, most = loop_with("triad")[1], 0.25, 0.1
+    for name in ("sun-sensor", "magnetometer"):
+        loop = with_changed(loop, name, interval=every * period)
+    numbers, unseen = triad.prepare(triad.Params(), period), {"sun": (0.0, 0.0, 0.0), "sun_is_seen": 0.0}
+    readings = SimpleNamespace(**unseen, magnetic_field=(1e-5, 0.0, 0.0), position=(7e6, 0.0, 0.0), rate=(0.0, 0.0, 0.0))
+    memory = triad.remember(None, None)
+    for _ in range(every - 1):
+        estimate, memory = triad.estimate(readings, memory, numbers, None, period)
+    turned = Rotation.from_rotvec((every - 1) * most * period**2 / 4.0 * np.eye(3)[0])
+    off = (turned.inv() * Rotation.from_quat(estimate.attitude, scalar_first=True)).magnitude()
+    assert 0.4 < off / (measured(loop).amiss.attitude_per_acceleration * most) < 1.0
 
 
 def test_a_limit_that_the_field_does_not_reach_does_nothing():

@@ -11,6 +11,7 @@ import numpy as np
 from starhold.algebra.quaternion import conjugate, multiply, to_reference
 from starhold.algebra.vector import ZERO
 from starhold.certification.certificate import FRESH, LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
+from starhold.certification.directions import AGE
 from starhold.certification.orbit_band import strays
 from starhold.certification.target_motion import motion_of
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
@@ -58,7 +59,7 @@ def assumption(identifier: str) -> Assumption:
         age = float(identifier.removeprefix(FRESH))
 
         def aged(span: Any) -> Unmet:
-            names = (f"{fitted.called.replace('-', '_')}_attitude_age" for fitted in span.loop.used("estimator"))
+            names = (f"{fitted.called.replace('-', '_')}_{AGE}" for fitted in span.loop.used("estimator"))
             # Ages are sums of control periods.
             return [(span[name] > age * MORE + NEAR, "directions give no attitude") for name in names]
 

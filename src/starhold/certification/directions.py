@@ -19,6 +19,8 @@ the covariance of what it adds be at most some S, whatever came before. Then the
 Gaussian y of the covariances S, for any l, so that P(|y| > k) <= (k^2/3)^(3/2) exp(3/2 - k^2/2) for a y of three components
 and unit covariance (the mean over Gaussian l of covariance 1 - 3/k^2). This is less than the kernel's bound for a y wider by
 1.16 wherever that is below 1e-4; and it is, for any share of an orbit or an hour, with control periods of up to 100 s."""
+AGE = "attitude_age"
+"""The estimate that tells whether directions are there (s)."""
 NEAR = 5e-3
 """The share of its least distance within which the Earth's surroundings of an orbit are considered."""
 
@@ -39,12 +41,15 @@ def is_directed(estimator: Fitted) -> bool:
 
 
 def directed(loop: ClosedLoop, estimator: Fitted) -> Directed | None:
-    """Return the bounds of the attitude of such an estimator; None where a sensor says none, or knows Sun and field as of
-    another epoch or otherwise than the estimator."""
+    """Return the bounds of the attitude of such an estimator; None where it does not tell how old this is, where a sensor
+    says no bounds, or those of one direction while it shows another or two, or knows Sun and field as of another epoch or
+    otherwise than the estimator."""
     module: Any = estimator.part.module
     names = {
         name: kind for kind, (name, *_) in KINDS.items() if name in module.NEEDS or name in getattr(module, "SEVERAL", ())
     }
+    if AGE not in module.Estimate._fields or not {"epoch", "ephemeris"} <= {*estimator.params._fields}:
+        return None
     sensors = tuple(f for f in loop.used("sensor") if shown(f) & {*names, "position"})
     places = [f for f in sensors if "position" in shown(f)][:1]
     seeing = [f for f in sensors if shown(f) & names.keys()]
@@ -63,9 +68,11 @@ def directed(loop: ClosedLoop, estimator: Fitted) -> Directed | None:
         return None
     (where,) = (tell(f.params, sky) for tell, f in zip(tell_places, places, strict=True))
     off: float = where.error
-    moved = {"field": off * sky.turning, "nadir": off / sky.distance}
+    moved = {"sun": 0.0, "field": off * sky.turning, "nadir": off / sky.distance}
     seen: list[Direction] = [tell(f.params, loop.period, sky) for tell, f in zip(tells, seeing, strict=True)]
-    seen = [one._replace(error=one.error + moved.get(one.of, 0.0)) for one in seen]
+    if any({names[name] for name in shown(f) & names.keys()} != {one.of} for f, one in zip(seeing, seen, strict=True)):
+        return None
+    seen = [one.beside(moved[one.of]) for one in seen]
     if off > NEAR * sky.distance or not all(isfinite(one.error) for one in seen):
         return None
     combined = module.combined(estimator.params, tuple(seen))

@@ -116,6 +116,14 @@ class Direction(NamedTuple):
         """The largest |d + n|, where n is no longer than Gaussian vectors are assumed to be."""
         return self.error + DEVIATIONS * self.deviation
 
+    def beside(self, sine: float) -> Direction:
+        """Return how far it is from another direction a', at an angle from a of at most this sine, to which a/cos is a' and
+        a vector across it of the length tan."""
+        if not sine < 1.0:
+            return self._replace(error=math.inf)
+        cosine = math.sqrt(1.0 - sine * sine)
+        return self._replace(error=(self.error + sine) / cosine, deviation=self.deviation / cosine)
+
 
 class Place(NamedTuple):
     """How far off a measured position is at most (m), where the Gaussian vectors on which it depends, so many at a reading,

@@ -73,7 +73,9 @@ def fixed(directions: tuple[Direction, ...], error: float, deviation: float) -> 
 def recursion(params: Any, noise: Noise, period: float, rate: Vector) -> Recursion | None:
     """Return the recursion of the errors of an attitude that directions give and the gyro propagates until they give the
     next, and of the gyro's last reading, on a body at a constant rate (rad/s, body axes); None with a bias that walks, which
-    nothing corrects."""
+    nothing corrects. The mean of two readings is off the rate between them by no more than the acceleration in half a
+    period: n periods after directions the attitude is off by n times half a period of this, in which readings before the
+    last count for n - 1/2 periods."""
     if noise.walk:
         return None
     _, axes, drift = turned(rate, period)
@@ -87,4 +89,6 @@ def recursion(params: Any, noise: Noise, period: float, rate: Vector) -> Recursi
         turn, now = apply(noise.attitude, random[2]), scale(noise.rate, random[0])
         return (turn, now), turn, now
 
-    return Recursion(corrected, carried, noise.every, 2, biased=True)
+    periods = noise.every - 1
+    lag = periods * period / (2.0 * periods - 1.0) if periods else 0.0
+    return Recursion(corrected, carried, noise.every, 2, lag=lag, biased=True)

@@ -112,8 +112,9 @@ def direction(params: Params, period: float, sky: Sky) -> Direction:
     if as_built.is_given(params.jitter) or square <= 0.0:
         return Direction("nadir", math.inf, every=every)
     skewed = as_built.stretch(as_built.axes_of(params.mounting_error, ZERO))
-    error = skewed + abs(params.limb_height) / math.sqrt(square) + params.delay * sky.speed / sky.distance
-    return Direction("nadir", error, params.noise, params.delay, every)
+    error = skewed + abs(params.limb_height) / math.sqrt(square)
+    seen = Direction("nadir", error, params.noise, params.delay, every)
+    return seen.beside(params.delay * sky.speed / sky.distance)
 
 
 def examples() -> list[Params]:

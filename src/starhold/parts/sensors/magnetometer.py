@@ -134,9 +134,8 @@ def direction(params: Params, period: float, sky: Sky) -> Direction:
     if as_built.is_given(params.jitter) or clipped:
         return Direction("field", math.inf, every=every)
     least = factor * sky.weakest
-    # The axes act on the field of where the craft was.
-    error = skewed + (1.0 + skewed) * params.delay * sky.speed * sky.turning + added / least
-    return Direction("field", error, deviation / least, params.delay, every)
+    seen = Direction("field", skewed + added / least, deviation / least, params.delay, every)
+    return seen.beside(params.delay * sky.speed * sky.turning)
 
 
 def noise(params: Params, period: float) -> Noise:
