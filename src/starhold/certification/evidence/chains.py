@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib import import_module
-from math import inf
-from typing import Any, TypeAlias
+from math import inf, log
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -21,15 +22,39 @@ from starhold.kernel.held import Held
 from starhold.kernel.numbers import RefusedError, plus, times, transpose
 from starhold.kernel.regions import STATE, Tube, balls
 from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
-from starhold.kernel.theorems.response import first_of, responds
+from starhold.kernel.theorems.response import Response, first_of, responds
 
 linalg: Any = import_module("scipy.linalg")
 
-FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 8.0, 20, 24
+FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 8.0, 32, 24
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
 the largest ratio of successive levels; the most levels and ellipsoids."""
+SHORTEST, ALIKE, WORTH = 0.08, 1.002, 0.995
+"""The least share of the largest ratio, in powers; up to which multiple of another a bound counts as no wider; and the share of
+the last bound below which one is worth the time of another response."""
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
+
+
+class Falls(NamedTuple):
+    """Tau, beta and the lowest level proved to be reached from another, the lowest of all first; and its tube."""
+
+    choices: list[Lower]
+    tube: Tube | None
+
+    @property
+    def pace(self) -> float:
+        """Return by how much V decreases at most in a unit of time, as a share."""
+        return max((float(beta) for _, beta, _ in self.choices), default=0.0)
+
+    def quickest(self, c: Fraction, end: Fraction) -> Lower:
+        """Return the choice by which motions come from one level to another the soonest."""
+
+        def lasts(one: Lower) -> float:
+            _, beta, floor = map(float, one)
+            return log((float(c) - floor) / (float(end) - floor)) / beta if FLOOR * floor <= float(end) else inf
+
+        return min(self.choices, key=lasts)
 
 
 @dataclass
@@ -39,12 +64,14 @@ class Chain:
     motion: Held
     V: str
     level: float
-    tried: dict[Any, Lower | None] = field(default_factory=dict[Any, "Lower | None"])
-    """The results of `lower`, for all chains of one V."""
+    tried: dict[Any, Falls] = field(default_factory=dict[Any, Falls])
+    """The results of `falls`, for all chains of one V."""
     shape: Shape = field(default_factory=lambda: Shape(0.0))
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     response: dict[str, Any] = field(default_factory=dict[str, Any])
+    reached: list[int] = field(default_factory=list[int])
+    """After how many samples motions are in each of the levels."""
     samples: int = 0
 
     @property
@@ -54,9 +81,14 @@ class Chain:
         sizes = motion.region(Fraction(self.level)).sizes
         return {name: float(sizes[name]) or 1.0 for name in (*STATE, *motion.others)}
 
+    @property
+    def nearly_linear(self) -> Fraction:
+        """Return a level in which all motions are."""
+        return (self.motion.s + self.motion.G[3][3]) / 2**20
+
     def aim(self) -> float:
         """Return the level that disturbances allow where all motions are nearly linear."""
-        lower = self.lower((self.motion.s + self.motion.G[3][3]) / 2**20)
+        lower = self.lower(self.nearly_linear)
         return inf if lower is None else float(lower[2])
 
     def decreases(self) -> bool:
@@ -74,50 +106,53 @@ class Chain:
         return {"level": self.level} | late | {"plan.error": float(off) * MORE}
 
     def descend(self) -> float:
-        """Find the levels, and return the last."""
-        c, tube = Fraction(self.level), None
-        while len(self.levels) < LEVELS and (lower := self.lower(c)) is not None:
-            tau, beta, floor = lower
-            end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
+        """Find the levels, and return the last. Where V hardly decreases, they follow each other closely."""
+        c, tube, pace = Fraction(self.level), None, self.falls(self.nearly_linear).pace
+        while len(self.levels) < LEVELS and (falls := self.falls(c)).choices:
+            ratio = DEEPEST ** min(max(falls.pace / pace if pace else 1.0, SHORTEST), 1.0)
+            end = Fraction(max(float(falls.choices[0][2]) * FLOOR, float(c) / ratio))
             if end > c * Fraction(9, 10):
                 break
+            tau, beta, floor = falls.quickest(c, end)
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
             tube, more = on_level(self.motion, end, tube or self.motion.tube(self.motion.region(c)))
             self.samples += periods(self.motion.h * beta, floor, c, end) + more
+            self.reached.append(self.samples)
             c = end
         return float(c)
 
     def lower(self, c: Fraction) -> Lower | None:
         """Return tau and beta for the lowest level proved to be reached from another, and that level."""
+        return next(iter(self.falls(c).choices), None)
+
+    def falls(self, c: Fraction) -> Falls:
+        """Return how V decreases from a level."""
         key = c, self.motion.late
         if key not in self.tried:
-            self.tried[key] = self.lowest(c)
+            self.tried[key] = self.found(c)
         return self.tried[key]
 
-    def lowest(self, c: Fraction) -> Lower | None:
-        """Find what `lower` returns."""
+    def found(self, c: Fraction) -> Falls:
+        """Find what `falls` returns."""
         motion = self.motion
         try:
-            exact, above, felt, push, rest, spare = motion.fall(on_level(motion, c)[0])
+            tube = on_level(motion, c)[0]
+            exact, above, felt, push, rest, spare = motion.fall(tube)
         except RefusedError:
-            return None
+            return Falls([], None)
         Q, H, F = floats(exact), floats(above), floats(felt)
         if float(np.linalg.eigvalsh(Q)[0]) <= 0.0:
-            return None
+            return Falls([], tube)
         R = F.T @ F
         largest = 1.0 / float(linalg.eigh(R, Q, eigvals_only=True)[-1])
-
-        def floor(share: float) -> tuple[float, float, float]:
-            tau = largest * share
+        choices = list[Lower]()
+        for tau in largest * np.linspace(0.02, 0.98, 33):
             beta = float(linalg.eigh(Q - tau * R, H, eigvals_only=True)[0]) * (1.0 - 1e-6)
             beta = min(beta, float(spare) * (1.0 - 1e-6) / float(motion.h))
-            return ((float(push) ** 2 / (4.0 * tau) + float(rest)) / beta if beta > 0.0 else inf), tau, beta
-
-        _, tau, beta = min(floor(share) for share in np.linspace(0.02, 0.98, 33))
-        if beta <= 0.0:
-            return None
-        t, b = Fraction(tau), Fraction(beta)
-        return t, b, (push * push / (4 * t) + rest) / b
+            if beta > 0.0:
+                t, b = Fraction(float(tau)), Fraction(beta)
+                choices.append((t, b, (push * push / (4 * t) + rest) / b))
+        return Falls(sorted(choices, key=lambda one: one[2]), tube)
 
     def tighten(self, tube: Tube) -> tuple[float, float]:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
@@ -156,21 +191,39 @@ class Chain:
 
     def nearest(self) -> tuple[Chain, tuple[float, float]]:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
-        (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
-        tube, _ = on_level(self.motion, Fraction(self.levels[-1]["end"]))
-        self.motion.nears(tube)
-        one = replace(self, ellipsoids=list[Any]())
-        ends = [(one, one.respond(tube))]
-        if not one.response or self.motion.loop.wheels:
-            ends.append((self, self.tighten(tube)))
-        return min(ends, key=lambda pair: pair[1][0])
+        (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response. They begin in the level from
+        which motions are there the soonest."""
+        evidence, count = find_response(self.motion), len(self.levels)
+        response = None if evidence is None else concluded(responds(self.motion, evidence["weights"], evidence["gains"]))
 
-    def respond(self, tube: Tube) -> tuple[float, float]:
-        """Find how often the response brings motions nearer, and return the ultimate bounds."""
-        motion, evidence = self.motion, find_response(self.motion)
+        def respond(one: Chain, tube: Tube) -> tuple[float, float]:
+            return one.respond(tube, evidence, response)
+
+        one = self.ended(respond, count)
+        ways = [(respond, one)]
+        if not one[0].response or self.motion.loop.wheels:
+            ways.append((Chain.tighten, self.ended(Chain.tighten, count)))
+        way, best = min(ways, key=lambda pair: pair[1][1][0])
+        most = best[1][0] * ALIKE
+        while count := count - 1:
+            sooner = self.ended(way, count)
+            if sooner[1][0] > most:
+                break
+            best = min(best, sooner, key=lambda one: one[0].samples)
+        return best
+
+    def ended(self, way: Callable[[Chain, Tube], tuple[float, float]], count: int) -> tuple[Chain, tuple[float, float]]:
+        """Return the chain with only so many levels and what follows them, and the ultimate bounds."""
+        one = replace(self, levels=self.levels[:count], ellipsoids=list[Any](), samples=self.reached[count - 1])
+        tube, _ = on_level(self.motion, Fraction(one.levels[-1]["end"]))
+        self.motion.nears(tube)
+        return one, way(one, tube)
+
+    def respond(self, tube: Tube, evidence: dict[str, Any] | None, response: Response | None) -> tuple[float, float]:
+        """Find how often a response brings motions nearer, and return the ultimate bounds."""
+        motion = self.motion
         (begun, pulled), rounds = first_of(motion, tube), 0
         angle, fastest = ends(self.motion, tube, tube.region.X)
-        response = None if evidence is None else concluded(responds(motion, evidence["weights"], evidence["gains"]))
         while evidence is not None and response is not None and rounds < ROUNDS:
             try:
                 within, more = forgotten(motion, tube)
@@ -179,7 +232,7 @@ class Chain:
             except RefusedError:
                 break
             end = ends(self.motion, inner, balls(begun), motion.away)
-            if not end[0] < angle * 0.999:
+            if not end[0] < angle * WORTH:
                 break
             tube, (angle, fastest), rounds = inner, end, rounds + 1
             self.samples += response.count + more

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.chains import Chain, Lower
+from starhold.certification.evidence.chains import Chain, Falls
 from starhold.certification.evidence.ellipsoids import MORE
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.lates import begun_late, numbers_of, resting, weighed
@@ -89,12 +89,12 @@ def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pus
 
 
 class Lean(NamedTuple):
-    """A V by its shape and digest, the loop with it, and the results of `lower`."""
+    """A V by its shape and digest, the loop with it, and the results of `falls`."""
 
     shape: Shape
     V: str
     motion: Held
-    tried: dict[Any, Lower | None]
+    tried: dict[Any, Falls]
 
 
 class Pushed:
