@@ -30,7 +30,7 @@ def pushed():
 def test_the_set_that_holds_a_start_keeps_the_limits_with_a_softer_potential_alone(pushed):
     limits = pushed.loop.limits
     kept = []
-    for shape in (*pushed.usual, *soft(pushed.sampled(pushed.usual[0]).motion, limits, ANGLE, RATE)):
+    for shape in (*pushed.usual, *soft(pushed.sampled(pushed.usual[0]).motion, limits, ANGLE, RATE, ())):
         chain = pushed.chain(shape, ANGLE, RATE)
         claim = pushed.claim(chain.V, pushed.beginning(ANGLE, RATE, limits) | chain.of_level())
         kept.append(begins(pushed.loop, claim, chain.scales))

@@ -29,9 +29,9 @@ linalg: Any = import_module("scipy.linalg")
 FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 8.0, 32, 24
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
 the largest ratio of successive levels; the most levels and ellipsoids."""
-SHORTEST, ALIKE, WORTH = 0.08, 1.002, 0.995
-"""The least share of the largest ratio, in powers; up to which multiple of another a bound counts as no wider; and the share of
-the last bound below which one is worth the time of another response."""
+LOWER, SHORTEST, ALIKE, WORTH = 0.9, 0.08, 1.002, 0.995
+"""The share of a level that the next one is at most; the least share of the largest ratio, in powers; up to which multiple
+of another a bound counts as no wider; the share of the last bound below which one is worth the time of another response."""
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 
@@ -92,9 +92,9 @@ class Chain:
         return inf if lower is None else float(lower[2])
 
     def decreases(self) -> bool:
-        """Return whether V decreases on the whole set, down to a lower level."""
+        """Return whether V decreases on the whole set, down to a noticeably lower level."""
         lower = self.lower(Fraction(self.level))
-        return lower is not None and lower[2] < Fraction(self.level)
+        return lower is not None and float(lower[2]) * FLOOR <= self.level * LOWER
 
     def of_level(self) -> dict[str, Any]:
         """Return the claim's numbers that follow from its level."""
@@ -111,7 +111,7 @@ class Chain:
         while len(self.levels) < LEVELS and (falls := self.falls(c)).choices:
             ratio = DEEPEST ** min(max(falls.pace / pace if pace else 1.0, SHORTEST), 1.0)
             end = Fraction(max(float(falls.choices[0][2]) * FLOOR, float(c) / ratio))
-            if end > c * Fraction(9, 10):
+            if float(end) > float(c) * LOWER:
                 break
             tau, beta, floor = falls.quickest(c, end)
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
