@@ -217,7 +217,7 @@ class Pushed:
         return []
 
     def within(self, angle: float, rate: float, limits: dict[str, float]) -> list[Shape]:
-        """Return shapes of V to try within limits."""
+        """Return shapes of V to try within limits: of those whose set demands little torque, and of the usual ones."""
         return soft(self.sampled(self.usual[0]).motion, limits, angle, rate, self.usual)
 
     def beginning(self, angle: float, rate: float, limits: dict[str, float]) -> dict[str, Any]:
