@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib import import_module
 from math import inf, log
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -36,25 +36,22 @@ of another a bound counts as no wider; the share of the last bound below which o
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 
 
-class Falls(NamedTuple):
-    """Tau, beta and the lowest level proved to be reached from another, the lowest of all first; and its tube."""
-
-    choices: list[Lower]
-    tube: Tube | None
+class Falls(list[Lower]):
+    """Tau, beta and the lowest level proved to be reached from another; the lowest of these levels comes first."""
 
     @property
     def pace(self) -> float:
-        """Return by how much V decreases at most in a unit of time, as a share."""
-        return max((float(beta) for _, beta, _ in self.choices), default=0.0)
+        """Return by what share V decreases at most in a unit of time."""
+        return max((float(beta) for _, beta, _ in self), default=0.0)
 
     def quickest(self, c: Fraction, end: Fraction) -> Lower:
-        """Return the choice by which motions come from one level to another the soonest."""
+        """Return that by which motions come soonest from one level to another."""
 
         def lasts(one: Lower) -> float:
             _, beta, floor = map(float, one)
-            return log((float(c) - floor) / (float(end) - floor)) / beta if FLOOR * floor <= float(end) else inf
+            return log((float(c) - floor) / (float(end) - floor)) / beta if FLOOR * floor <= float(end) * MORE else inf
 
-        return min(self.choices, key=lasts)
+        return min(self, key=lasts)
 
 
 @dataclass
@@ -108,9 +105,9 @@ class Chain:
     def descend(self) -> float:
         """Find the levels, and return the last. Where V hardly decreases, they follow each other closely."""
         c, tube, pace = Fraction(self.level), None, self.falls(self.nearly_linear).pace
-        while len(self.levels) < LEVELS and (falls := self.falls(c)).choices:
+        while len(self.levels) < LEVELS and (falls := self.falls(c)):
             ratio = DEEPEST ** min(max(falls.pace / pace if pace else 1.0, SHORTEST), 1.0)
-            end = Fraction(max(float(falls.choices[0][2]) * FLOOR, float(c) / ratio))
+            end = Fraction(max(float(falls[0][2]) * FLOOR, float(c) / ratio))
             if float(end) > float(c) * LOWER:
                 break
             tau, beta, floor = falls.quickest(c, end)
@@ -123,7 +120,7 @@ class Chain:
 
     def lower(self, c: Fraction) -> Lower | None:
         """Return tau and beta for the lowest level proved to be reached from another, and that level."""
-        return next(iter(self.falls(c).choices), None)
+        return next(iter(self.falls(c)), None)
 
     def falls(self, c: Fraction) -> Falls:
         """Return how V decreases from a level."""
@@ -136,23 +133,23 @@ class Chain:
         """Find what `falls` returns."""
         motion = self.motion
         try:
-            tube = on_level(motion, c)[0]
-            exact, above, felt, push, rest, spare = motion.fall(tube)
+            exact, above, felt, push, rest, spare = motion.fall(on_level(motion, c)[0])
         except RefusedError:
-            return Falls([], None)
+            return Falls()
         Q, H, F = floats(exact), floats(above), floats(felt)
         if float(np.linalg.eigvalsh(Q)[0]) <= 0.0:
-            return Falls([], tube)
+            return Falls()
         R = F.T @ F
         largest = 1.0 / float(linalg.eigh(R, Q, eigvals_only=True)[-1])
-        choices = list[Lower]()
+        falls = Falls()
         for tau in largest * np.linspace(0.02, 0.98, 33):
             beta = float(linalg.eigh(Q - tau * R, H, eigvals_only=True)[0]) * (1.0 - 1e-6)
             beta = min(beta, float(spare) * (1.0 - 1e-6) / float(motion.h))
             if beta > 0.0:
                 t, b = Fraction(float(tau)), Fraction(beta)
-                choices.append((t, b, (push * push / (4 * t) + rest) / b))
-        return Falls(sorted(choices, key=lambda one: one[2]), tube)
+                falls.append((t, b, (push * push / (4 * t) + rest) / b))
+        falls.sort(key=lambda one: one[2])
+        return falls
 
     def tighten(self, tube: Tube) -> tuple[float, float]:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
