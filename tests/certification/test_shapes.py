@@ -43,7 +43,7 @@ def test_the_set_that_holds_a_start_keeps_the_limits_with_a_softer_potential_alo
 
 
 def test_levels_follow_each_other_as_closely_as_v_decreases(pushed):
-    """What follows them begins where it leads home soonest: this start took 7132 s with wide steps down to the last level."""
+    """What follows them begins where it leads home soonest: this start took 7132 s with wide steps to the last level."""
     [chain] = pushed.begun(math.radians(2.0), math.radians(0.0245), pushed.loop.limits)
     chain.descend()
     ends = np.array([chain.level, *(float(Fraction(one["end"])) for one in chain.levels)])
