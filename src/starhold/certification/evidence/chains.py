@@ -34,6 +34,8 @@ LOWER, SHORTEST, ALIKE, WORTH = 0.9, 0.08, 1.002, 0.995
 of another a bound counts as no wider; the share of the last bound below which one is worth the time of another response."""
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
+Ends: TypeAlias = tuple[float, float]
+"""Ultimate bounds of angle (rad) and rate (rad/s)."""
 
 
 class Falls(list[Lower]):
@@ -151,7 +153,7 @@ class Chain:
         falls.sort(key=lambda one: one[2])
         return falls
 
-    def tighten(self, tube: Tube) -> tuple[float, float]:
+    def tighten(self, tube: Tube) -> Ends:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
         angle, fastest = ends(self.motion, tube, tube.region.X)
         heed, corners = HEED, self.motion.corners()
@@ -186,18 +188,18 @@ class Chain:
             tube, entered, (angle, fastest) = inner, X, end
         return angle, fastest
 
-    def nearest(self) -> tuple[Chain, tuple[float, float]]:
+    def nearest(self) -> tuple[Chain, Ends]:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
         (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response. They begin in the level from
         which motions are there the soonest."""
         evidence, count = find_response(self.motion), len(self.levels)
         response = None if evidence is None else concluded(responds(self.motion, evidence["weights"], evidence["gains"]))
 
-        def respond(one: Chain, tube: Tube) -> tuple[float, float]:
-            return one.respond(tube, evidence, response)
+        def respond(chain: Chain, tube: Tube, /) -> Ends:
+            return chain.respond(tube, evidence, response)
 
         one = self.ended(respond, count)
-        ways = [(respond, one)]
+        ways: list[tuple[Callable[[Chain, Tube], Ends], tuple[Chain, Ends]]] = [(respond, one)]
         if not one[0].response or self.motion.loop.wheels:
             ways.append((Chain.tighten, self.ended(Chain.tighten, count)))
         way, best = min(ways, key=lambda pair: pair[1][1][0])
@@ -209,14 +211,14 @@ class Chain:
             best = min(best, sooner, key=lambda one: one[0].samples)
         return best
 
-    def ended(self, way: Callable[[Chain, Tube], tuple[float, float]], count: int) -> tuple[Chain, tuple[float, float]]:
+    def ended(self, way: Callable[[Chain, Tube], Ends], count: int) -> tuple[Chain, Ends]:
         """Return the chain with only so many levels and what follows them, and the ultimate bounds."""
         one = replace(self, levels=self.levels[:count], ellipsoids=list[Any](), samples=self.reached[count - 1])
         tube, _ = on_level(self.motion, Fraction(one.levels[-1]["end"]))
         self.motion.nears(tube)
         return one, way(one, tube)
 
-    def respond(self, tube: Tube, evidence: dict[str, Any] | None, response: Response | None) -> tuple[float, float]:
+    def respond(self, tube: Tube, evidence: dict[str, Any] | None, response: Response | None) -> Ends:
         """Find how often a response brings motions nearer, and return the ultimate bounds."""
         motion = self.motion
         (begun, pulled), rounds = first_of(motion, tube), 0

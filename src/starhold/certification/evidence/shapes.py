@@ -81,9 +81,10 @@ def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> tuple[Array
         slope[:, TURN, RATE] += P[:, TURN, TURN] * (1.0 - turned) / 2.0
     form = -(slope + slope.transpose(0, 2, 1))
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", form), 1e-300))
-    definite = np.linalg.eigvalsh(form / scale[:, :, None] / scale[:, None, :])[:, 0]
     within = np.linalg.inv(np.linalg.cholesky(P))
-    return definite, np.linalg.eigvalsh(within @ form @ within.transpose(0, 2, 1))[:, 0]
+    forms = form / scale[:, :, None] / scale[:, None, :], within @ form @ within.transpose(0, 2, 1)
+    definite, pace = (np.asarray(np.linalg.eigvalsh(one)[:, 0], dtype=np.float64) for one in forms)
+    return definite, pace
 
 
 def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float, others: Sequence[Shape]) -> list[Shape]:
