@@ -205,7 +205,11 @@ class Chain:
         way, best = min(ways, key=lambda pair: pair[1][1][0])
         most = best[1][0] * ALIKE
         while count := count - 1:
-            sooner = self.ended(way, count)
+            try:
+                sooner = self.ended(way, count)
+            except (RefusedError, np.linalg.LinAlgError):
+                # Too far from the target.
+                break
             if sooner[1][0] > most:
                 break
             best = min(best, sooner, key=lambda one: one[0].samples)
