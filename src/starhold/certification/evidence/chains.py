@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -26,12 +27,12 @@ from starhold.kernel.theorems.response import Response, first_of, responds
 
 linalg: Any = import_module("scipy.linalg")
 
-FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 8.0, 32, 24
+FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 4.0, 40, 24
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
 the largest ratio of successive levels; the most levels and ellipsoids."""
-LOWER, SHORTEST, ALIKE, WORTH = 0.9, 0.08, 1.002, 0.995
+LOWER, SHORTEST, WORTH, ALIKE = 0.9, 0.12, 1.003, 1.005
 """The share of a level that the next one is at most; the least share of the largest ratio, in powers; up to which multiple
-of another a bound counts as no wider; the share of the last bound below which one is worth the time of another response."""
+of the last bound no further response is worth its time, and up to which multiple of another a bound counts as no wider."""
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 Ends: TypeAlias = tuple[float, float]
@@ -203,16 +204,24 @@ class Chain:
         if not one[0].response or self.motion.loop.wheels:
             ways.append((Chain.tighten, self.ended(Chain.tighten, count)))
         way, best = min(ways, key=lambda pair: pair[1][1][0])
-        most = best[1][0] * ALIKE
-        while count := count - 1:
+        most, after = best[1][0] * ALIKE, best[0].samples - self.reached[-1]
+        sooner = dict[int, tuple[Chain, Ends]]()
+
+        def near(count: int) -> bool:
             try:
-                sooner = self.ended(way, count)
+                sooner[count] = self.ended(way, count)
             except (RefusedError, np.linalg.LinAlgError):
                 # Too far from the target.
+                return False
+            return sooner[count][1][0] <= most
+
+        first = bisect_left(range(1, count), True, key=near) + 1
+        for place in range(first, count):
+            # From lower levels no less follows than from the last.
+            if self.reached[place - 1] + after >= best[0].samples:
                 break
-            if sooner[1][0] > most:
-                break
-            best = min(best, sooner, key=lambda one: one[0].samples)
+            if place in sooner or near(place):
+                best = min(best, sooner[place], key=lambda one: one[0].samples)
         return best
 
     def ended(self, way: Callable[[Chain, Tube], Ends], count: int) -> tuple[Chain, Ends]:
@@ -225,19 +234,22 @@ class Chain:
     def respond(self, tube: Tube, evidence: dict[str, Any] | None, response: Response | None) -> Ends:
         """Find how often a response brings motions nearer, and return the ultimate bounds."""
         motion = self.motion
-        (begun, pulled), rounds = first_of(motion, tube), 0
-        angle, fastest = ends(self.motion, tube, tube.region.X)
-        while evidence is not None and response is not None and rounds < ROUNDS:
+        (begun, pulled), samples = first_of(motion, tube), self.samples
+        found = [(samples, ends(self.motion, tube, tube.region.X))]
+        while evidence is not None and response is not None and len(found) <= ROUNDS:
             try:
                 within, more = forgotten(motion, tube)
-                begun, pulled, inner = response.after(motion, within, begun, pulled)
-                more += waited(motion, within, inner)
+                begun, pulled, tube = response.after(motion, within, begun, pulled)
+                more += waited(motion, within, tube)
             except RefusedError:
                 break
-            end = ends(self.motion, inner, balls(begun), motion.away)
-            if not end[0] < angle * WORTH:
+            end = ends(self.motion, tube, balls(begun), motion.away)
+            if not end[0] < found[-1][1][0] * 0.999:
                 break
-            tube, (angle, fastest), rounds = inner, end, rounds + 1
-            self.samples += response.count + more
-            self.response = {"response": evidence | {"rounds": rounds}}
-        return angle, fastest
+            samples += response.count + more
+            found.append((samples, end))
+        # As often as is worth the time.
+        rounds = next(k for k, (_, end) in enumerate(found) if end[0] <= found[-1][1][0] * WORTH)
+        self.samples, end = found[rounds]
+        self.response = {"response": (evidence or {}) | {"rounds": rounds}} if rounds else {}
+        return end
