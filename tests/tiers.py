@@ -1,10 +1,14 @@
 """How much of long products a run of the tests goes through: a part in `make test`, the whole in `make test-all`."""
 
 import os
+import random
+from datetime import UTC, datetime
 
 import pytest
 
 WHOLE = os.environ.get("STARHOLD_TESTS") == "whole"
+SEED = os.environ.setdefault("STARHOLD_SEED", f"{datetime.now(UTC):%Y%m%d}")
+"""What is drawn depends on the day, and is alike for all workers, which inherit it; set it to draw what another day drew."""
 
 
 def fewer(count: int, share: int = 5) -> int:
@@ -16,3 +20,17 @@ def leading(cases, count=1):
     """Parameters of a test, of which `make test` tries the first `count` and `make test-all` every one."""
     given = [case if isinstance(case, tuple) else (case,) for case in cases]
     return [pytest.param(*values, marks=() if place < count else pytest.mark.slow) for place, values in enumerate(given)]
+
+
+def drawn(cases, count, first=1):
+    """Parameters of a test whose cases are a product, or a search that found all it would find in these very cases: `make
+    test` tries the first ones, `make test-all` so many others besides, which differ from day to day."""
+    cases = [*cases]
+    others = random.Random(f"{SEED} {len(cases)}").sample(range(first, len(cases)), min(count, len(cases) - first))
+    return leading([*cases[:first], *(cases[k] for k in sorted(others))], first)
+
+
+def seeds(count):
+    """Seeds of random examples that differ from day to day."""
+    begin = int.from_bytes(random.Random(SEED).randbytes(3))
+    return range(begin, begin + count)
