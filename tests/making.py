@@ -17,6 +17,7 @@ from starhold.parts.effectors.wheels import ALLOCATIONS
 from starhold.parts.effectors.wheels import State as Rotors
 from starhold.parts.part import Fitted
 from starhold.scenario.building import build
+from starhold.scenario.reading import load
 from starhold.simulation.lane import Recording, fly, label
 
 ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
@@ -94,9 +95,10 @@ def point_loop(
     )  # fmt: skip
 
 
-def built(scenario: Any) -> ClosedLoop:
-    """The loop of a scenario's first law."""
-    return build(scenario, scenario.laws[0])
+def built(scenario: Any, law: str | None = None) -> ClosedLoop:
+    """The loop of a scenario, or of the built-in one of this name, with this law, or with its first."""
+    scenario = load(scenario) if isinstance(scenario, str) else scenario
+    return build(scenario, scenario.pick(law))
 
 
 def flown(loop: ClosedLoop, steps: int = 600, run: int = 0) -> Recording:

@@ -279,8 +279,7 @@ def budget(scenario: reading.Scenario | str | Path, law: str | None = None, proo
 @shortly
 def verify(scenario: reading.Scenario | str | Path, law: str | None = None) -> tuple[RequirementVerdict, ...]:
     """Return the verdicts on a law, by default the first: one for each [[requirement]] of the scenario, in order, with
-    number, limit and margin (SI), and the evidence. InputError for any mistake, before anything is flown.
-    """
+    number, limit and margin (SI), and the evidence. InputError for any mistake, before anything is flown."""
     return studied("verify", scenario, law)
 
 

@@ -15,13 +15,11 @@ from starhold.certification.certify import certify
 from starhold.laws.catalogue import catalogue, from_file
 from starhold.loop.kernels import make_step
 from starhold.parts.catalogue import fit
-from starhold.scenario.building import build
-from starhold.scenario.reading import load
+from tests.making import built
 
 
 def loop_of(scenario, law):
-    opened = load(scenario)
-    return build(opened, opened.pick(law))
+    return built(scenario, law)
 
 
 def with_integral():

@@ -16,6 +16,7 @@ from starhold.scenario.reading import parse
 from starhold.simulation import lane
 from starhold.studies import budget, compare, deciding
 from starhold.studies.verification import verdicts_of_flight
+from tests.making import built
 from tests.missions import BASE, DETUMBLE, POINT
 from tests.refusals import complains, refused
 from tests.required import ALL, BETWEEN, ERROR, KEPT, MANY, OFF, PHASE, PROOF, SETTLES, STILL, TURN, turn
@@ -297,8 +298,7 @@ GATHERING = {
 
 @pytest.mark.parametrize(("momentum", "enough"), [(0.0, False), (0.99, False), (1.01, True)])
 def test_the_momentum_that_a_claim_assumes_is_compared_with_what_gathers(momentum, enough):
-    given = sh.scenario(GATHERING)
-    loop = build(given, given.laws[0])
+    loop = built(sh.scenario(GATHERING))
     numbers = {"torque": 1e-4, "torque_per_rate": 0.0, "told": False, "momentum": momentum}
     claim = SimpleNamespace(numbers=numbers, assumptions=("bounded-momentum",))
     issued = SimpleNamespace(loop=loop, certificate=SimpleNamespace(subject={"modelled_torque_norm": 0.0}))

@@ -45,7 +45,7 @@ def mission():
 
 
 CASES = {
-    "more than a block of threads": (heavier, {"spacecraft.inertia": SHARE, "initial.rate": normal(0.01)}, "lyapunov", 131),
+    "more than a block of threads": (heavier, {"spacecraft.inertia": SHARE, "initial.rate": normal(0.01)}, "lyapunov", 131)
 }
 MISSION = (mission, {"orbit.raan": uniform("0 deg", "360 deg"), "part.mekf.cross": SHARE}, "wheel", 3)
 

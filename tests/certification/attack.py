@@ -8,10 +8,9 @@ import numpy as np
 from starhold.algebra.structure import flatten
 from starhold.parts.craft import tensor
 from starhold.simulation.lanes import simulate_many
-from tests.kernel.flights import Fleet, Surroundings, along, cross, times, turn
+from tests.kernel.flights import along, cross, times, turn
 from tests.kernel.oracle import Oracle
 from tests.kernel.planned import Planned as Plans
-from tests.kernel.programs import run
 
 LANES, PERIODS, SETTLED = 96, 2000, 40.0
 """Lanes of a fleet, the most periods that they fly, and the time in units of the loop's own after which nothing is left of
@@ -26,39 +25,6 @@ class Attack(Oracle):
     def __init__(self, content, claim, seed, lanes=LANES):
         super().__init__(content, claim, seed)
         self.lanes = lanes
-        _, stiffness = self.linear()
-        self.slow = math.sqrt(np.linalg.eigvals(np.linalg.solve(self.J, stiffness)).real.min() / 2)
-
-    def fleet(self):
-        n = self.numbers
-
-        def law(q, w, *around):
-            given = self.inputs(q, w, *(around or [np.zeros(w.shape)] * 4))[0]
-            return run(self.programs["law"], given)[:3]
-
-        found = Fleet(
-            self.true, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), self.lanes
-        )
-        found.added = n.get("memory", 0.0)
-        if "late.torque.mean" in n:
-            found.late = n["late.torque.kept"], n["late.torque.mean"], n["late.torque.begun"]
-        found.growing = n.get("outside.per.rate", 0.0), n.get("error.per.rate", 0.0)
-        found.around = Surroundings(
-            [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
-            n.get("momentum") if "wheels" in self.words else None,
-            *(n.get(f"error.{told}", 0.0) for told in ("attitude", "rate")),
-            self.noise(self.lanes, self.rng) if "share" in n else None,
-            (n.get("told.change", np.inf), n.get("told.change.per.rate", 0.0)),
-            (n.get("noise.torque.deviation", 0.0), n.get("noise.torque", 0.0)),
-            self.moving(),
-        )  # fmt: skip
-        return found
-
-    def moving(self):
-        """How errors of what the law is told grow with the motion, if they do."""
-        n = self.numbers
-        rows = [[n.get(f"error.{told}.per.{of}", 0.0) for of in ("rate", "acceleration")] for told in ("attitude", "rate")]
-        return (rows, max(1, int(n.get("error.ago", 0.0) / n["period"])), n["period"]) if np.any(rows) else None
 
     def step(self):
         """What the state (w, q) and a torque held for a period are of the state after it, near rest."""

@@ -17,6 +17,7 @@ from starhold.studies.chain import _unending, chains, links_of, sentence, summar
 from starhold.studies.modes import fresh_momentum, hand_overs
 from tests.certification.attack import Attack
 from tests.certification.handed import POINT, bounded
+from tests.making import built
 from tests.missions import BASE, DETUMBLE
 
 NEXT = POINT.replace('"point"', '"hold"')
@@ -108,8 +109,7 @@ def stated(name, momentum, angle=0.1, rate=0.02):
 
 
 def mission_loop():
-    scenario = load("cubesat-mission")
-    return build(scenario, scenario.laws[0])
+    return built("cubesat-mission")
 
 
 def mission_links(*certificates):

@@ -21,10 +21,7 @@ def given(claim):
     return {"programs": dict(claim.proof.programs)}, claim.proof.claim
 
 
-QUICK = [
-    (9025, "", None, (-0.264, -0.963, 0.051), 0.948),
-    (9042, "", None, (-0.473, 0.449, -0.758), 0.993),
-]
+QUICK = [(9025, "", None, (-0.264, -0.963, 0.051), 0.948), (9042, "", None, (-0.473, 0.449, -0.758), 0.993)]
 """Seed and kind of a random loop, the tolerance of its inertia, the direction in which its worst flight ends, and how far it
 comes as a share of what is proved: noise and wheels, and one that only torques push."""
 LONG = [

@@ -26,14 +26,7 @@ from tests.tiers import leading
 
 NO, PUSH = (lambda *_: None), (lambda *_: Push(1e-6))
 LAWS = ("pd-0", "sliding-0", "wheel-0", "lyapunov-0", "lqr-I", "lqr-II", "lqr-III", "matrix-pd-inertial", "modal")
-TAKEN = {
-    "two-body",
-    "gravity-gradient",
-    "linear-gravity",
-    "three-body-gravity",
-    "wheels",
-    "history",
-}
+TAKEN = {"two-body", "gravity-gradient", "linear-gravity", "three-body-gravity", "wheels", "history"}
 """The parts that the theorems in docs/certificates.md take in, beside targets that say their motion."""
 
 

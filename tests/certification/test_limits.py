@@ -60,7 +60,7 @@ def test_a_claim_within_other_limits_is_not_about_the_loop():
     assert apart(loop, told) == []
     assert apart(on_wheels(loop, power_limit=(0.5,) * 4), told) == [f"motors.{k} is lower" for k in range(4)]
     limited = replace(loop, limit="norm", craft=loop.craft._replace(torque_limit=1e-3))
-    assert apart(limited, told) == ["the limit is not told"]
+    assert apart(limited, told) == ["the limit is not stated"]
     assert apart(limited, told | {"limit.norm": "1/1000"}) == []
     # Three components within the limit may have a norm beyond it.
     assert apart(limited, told | {"limit": "1/1000"}) == ["the limit is one of another kind"]

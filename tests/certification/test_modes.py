@@ -18,6 +18,7 @@ from starhold.studies.certificates import compare_programs
 from starhold.studies.compare import fly_law, prove
 from starhold.studies.modes import loop_of_mode, most_stored, named_modes
 from tests.certification.handed import POINT, bounded, handed, issued
+from tests.making import built
 from tests.missions import BASE, DETUMBLE
 
 
@@ -114,8 +115,7 @@ def test_a_flight_leaves_the_claims_of_a_mode_when_that_ends():
 
 def test_claims_of_a_mode_assume_the_momentum_at_which_it_ends_or_begins():
     """In cubesat-mission nadir ends at 3 mN m s, and unload begins by it; sun begins with that of resting rotors."""
-    scenario = load("cubesat-mission")
-    loop = build(scenario, scenario.laws[0])
+    loop = built("cubesat-mission")
     rotors = 0.01 / math.sqrt(3.0)
     assert [most_stored(loop, place) for place in range(4)] == [math.inf, pytest.approx(rotors), 0.003, 0.003]
     nadir = named_modes(loop, "mission")["mission: nadir"]

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import starhold as sh
 from starhold.analysis.departure import departures
 from starhold.certification.certificate import Certificate, write
 from starhold.certification.certify import Wanted, certify
@@ -32,9 +31,9 @@ from starhold.kernel.held import CHANGE
 from starhold.parts.catalogue import find
 from starhold.parts.estimators import mekf
 from starhold.parts.part import Fitted
-from starhold.scenario.building import build
 from tests.certification.loops import certified
 from tests.kernel.certificates import flying, radii_of
+from tests.making import built
 from tests.tiers import leading
 
 SENSORS = {"sensor gyro", "sensor star-tracker", "estimator mekf"}
@@ -42,8 +41,7 @@ SENSORS = {"sensor gyro", "sensor star-tracker", "estimator mekf"}
 
 @cache
 def nadir():
-    given = sh.load("cubesat-nadir")
-    return build(given, given.pick("wheel"))
+    return built("cubesat-nadir", "wheel")
 
 
 def left_out(loop, share):
@@ -220,8 +218,7 @@ def test_a_share_is_told_and_a_flight_before_the_filter_settles_leaves_it():
 
 @pytest.mark.slow
 def test_against_more_noise_than_can_be_shown_the_claim_leaves_it_out():
-    given = sh.load("three-laws-noise")
-    loop = build(given, given.pick("lyapunov"))
+    loop = built("three-laws-noise", "lyapunov")
     claim = certify(loop, "here", Wanted(pointing=True)).claim("pointing")
     assert claim.outcome == "proved"
     assert claim.numbers["share"] is None
@@ -284,8 +281,7 @@ def test_a_torque_may_turn_over_at_once_if_its_position_is_told_or_its_part_does
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["lyapunov", "wheel"])
 def test_what_is_proved_of_a_cubesat_as_it_flies_is_checked(law, tmp_path, monkeypatch):
-    given = sh.load("cubesat-nadir")
-    certificate = certify(build(given, given.pick(law)), law, Wanted(pointing=True))
+    certificate = certify(built("cubesat-nadir", law), law, Wanted(pointing=True))
     assert certificate.outcome == "proved"
     assert math.degrees(certificate.claim("pointing").numbers["angle"]) < 0.20
     assert re.match(r"from (15 deg at 1|45 deg at 3) deg/s: motor", certificate.no_larger_start)

@@ -191,12 +191,7 @@ def test_other_laws_claim_nothing():
 
 @pytest.mark.parametrize(
     ("gains", "change"),
-    [
-        (RELAY, {"k": 3e-51}),
-        (RELAY, {"radius": 1e-150, "k": 3e199}),
-        (BEST, {"radius": 1e200}),
-        (SOFT, {"k": 1e-300}),
-    ],
+    [(RELAY, {"k": 3e-51}), (RELAY, {"radius": 1e-150, "k": 3e199}), (BEST, {"radius": 1e200}), (SOFT, {"k": 1e-300})],
 )
 def test_gains_of_any_size_end_in_what_the_checker_takes(made, gains, change):
     made(gains._replace(**change), 1.0)

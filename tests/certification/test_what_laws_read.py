@@ -16,9 +16,9 @@ from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes
 from starhold.errors import InputError
 from starhold.kernel.check import check
-from starhold.scenario.building import build
 from starhold.simulation.lane import fly, label
 from tests.kernel.certificates import text
+from tests.making import built
 
 LAW = """
 from typing import Annotated, NamedTuple
@@ -141,8 +141,7 @@ def loop_of(folder, told, potential=WELL, gains=(0.5, 0.05), attitude=None, **ta
         "simulation": {"duration": "20 min", "control_period": 0.1}, "target": {"mode": "inertial", "attitude": ASKEW},
         "initial": {"attitude": attitude or ASKEW},
     } | tables  # fmt: skip
-    scenario = sh.scenario(given)
-    return build(scenario, scenario.laws[0])
+    return built(sh.scenario(given))
 
 
 def flown(loop, steps):

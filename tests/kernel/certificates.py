@@ -18,6 +18,7 @@ from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.programs import digest
 from starhold.scenario.building import build
+from tests.making import built
 from tests.proofs import shared
 
 CRAFT = {"inertia": [2.0, 3.0, 4.0], "torque_limit": "0.01 N m", "limit": "norm"}
@@ -87,8 +88,7 @@ def flying(name):
     (inertia, k_rate, k_attitude, period), told = POINTING[name]
     law = {"type": "lyapunov", "k_rate": k_rate, "k_attitude": k_attitude}
     kept = {"simulation": {"duration": "1 min", "control_period": period}, "name": name, "law": [law]}
-    given = sh.scenario({"spacecraft": {"inertia": inertia}, "part": NOISY.get(name, [])} | kept)
-    loop = Loop(make_subject(build(given, given.laws[0])))
+    loop = Loop(make_subject(built(sh.scenario({"spacecraft": {"inertia": inertia}, "part": NOISY.get(name, [])} | kept))))
     outside, error, *start = told
     assert Pushed(loop, Pushes(outside, attitude=ERRORS.get(name, 0.0), command=error), noisy=True).find(*start), loop.failed
     return loop

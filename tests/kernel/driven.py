@@ -1,9 +1,13 @@
-"""Errors that noise drives, and the motion that they cause in the linear loop, of a claim as another reader has it."""
+"""What drives a loop by a claim, as another reader has it: errors of noise, the motion that they cause in the linear loop,
+and fleets of flights under all that acts."""
+
+import math
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import expm
 
-from tests.kernel.flights import Noise
+from tests.kernel.flights import Fleet, Noise, Surroundings
 from tests.kernel.programs import number, run
 
 
@@ -64,3 +68,41 @@ class Driven:
             x[:6] += shaken @ random.normal(size=(3, lanes)) if shaken.any() else 0.0
             most = np.maximum(most, sizes) if k >= 0 else most
         return most
+
+    @cached_property
+    def slow(self):
+        """The slowest rate of the loop near rest."""
+        _, stiffness = self.linear()
+        return math.sqrt(np.linalg.eigvals(np.linalg.solve(self.J, stiffness)).real.min() / 2)
+
+    def fleet(self):
+        """Lanes under all that a pointing claim tells of."""
+        n = self.numbers
+
+        def law(q, w, *around):
+            given = self.inputs(q, w, *(around or [np.zeros(w.shape)] * 4))[0]
+            return run(self.programs["law"], given)[:3]
+
+        found = Fleet(
+            self.true, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), self.lanes
+        )
+        found.added = n.get("memory", 0.0)
+        if "late.torque.mean" in n:
+            found.late = n["late.torque.kept"], n["late.torque.mean"], n["late.torque.begun"]
+        found.growing = n.get("outside.per.rate", 0.0), n.get("error.per.rate", 0.0)
+        found.around = Surroundings(
+            [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
+            n.get("momentum") if "wheels" in self.words else None,
+            *(n.get(f"error.{told}", 0.0) for told in ("attitude", "rate")),
+            self.noise(self.lanes, self.rng) if "share" in n else None,
+            (n.get("told.change", np.inf), n.get("told.change.per.rate", 0.0)),
+            (n.get("noise.torque.deviation", 0.0), n.get("noise.torque", 0.0)),
+            self.moving(),
+        )  # fmt: skip
+        return found
+
+    def moving(self):
+        """How errors of what the law is told grow with the motion, if they do."""
+        n = self.numbers
+        rows = [[n.get(f"error.{told}.per.{of}", 0.0) for of in ("rate", "acceleration")] for told in ("attitude", "rate")]
+        return (rows, max(1, int(n.get("error.ago", 0.0) / n["period"])), n["period"]) if np.any(rows) else None

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tests.kernel.driven import Driven
-from tests.kernel.flights import Fleet, Surroundings, cross, rates, stepped, turn
+from tests.kernel.flights import cross, rates, stepped, turn
 from tests.kernel.planned import Planned
 from tests.kernel.programs import number, run, written
 
@@ -297,28 +297,18 @@ class Oracle(Driven):
         if "plan" in self.words and not self.plans(tries):
             return False
 
-        def law(q, w, *around):
-            return run(self.programs["law"], self.inputs(q, w, *(around or [np.zeros(w.shape)] * 4))[0])[:3]
-
-        (_, stiffness), self.kept = self.linear(), 1e9
-        slow = math.sqrt(np.linalg.eigvals(np.linalg.solve(self.J, stiffness)).real.min() / 2)
-        errors = n["error"] + n.get("plan.error", 0.0)
-        fleet = Fleet(self.true, law, n["period"], n["outside"], errors, slow, int(self.rng.integers(1000)), 2 * tries)
-        fleet.around = Surroundings(
-            [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
-            n.get("momentum") if "wheels" in self.words else None,
-            *(n.get(f"error.{told}", 0.0) for told in ("attitude", "rate")),
-            self.noise(2 * tries, self.rng) if "share" in n else None,
-            (n.get("told.change", np.inf), n.get("told.change.per.rate", 0.0)),
-            (n.get("noise.torque.deviation", 0.0), n.get("noise.torque", 0.0)),
-        )  # fmt: skip
+        self.lanes = 2 * tries
+        fleet = self.fleet()
+        # What is in a memory is drawn here, in place of what it adds.
+        self.kept, fleet.added = 1e9, 0.0
+        fleet.error += n.get("plan.error", 0.0)
         states = [self.border(V0, level * self.rng.uniform()) for _ in range(tries)]
         states += [(self.shrunk(turned(self.rng), V0, level * 10.0 ** self.rng.uniform(-6, 0)), zero) for _ in range(tries)]
         start = (np.array(part).T for part in zip(*states, strict=True))
         periods = min(int(n["settling"] / n["period"]), 3000)
         for k, q, w in fleet.fly(*start, periods + 300):
             if (self.lyapunov(q, w) - V0 > n["highest"]).any() or (
-                k == 1 and np.abs(law(q, w)).max() > n.get("limit", np.inf)
+                k == 1 and np.abs(fleet.law(q, w)).max() > n.get("limit", np.inf)
             ):
                 return False
             off = (turn(q) > n["end.angle"]) | (np.linalg.norm(w, axis=0) > n["end.rate"])

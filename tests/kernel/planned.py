@@ -4,6 +4,7 @@ with the kernel and none with the law."""
 import math
 
 import numpy as np
+from scipy.linalg import expm
 
 
 def skew(v):
@@ -32,14 +33,7 @@ class Planned:
         M = np.zeros((lanes, 9, 9))
         M[:, :3, :3], M[:, :3, 3:6] = self.inverse @ (skew(self.J @ w) - spin @ self.J), self.inverse @ pull
         M[:, :3, 6:], M[:, 3:6, :3], M[:, 3:6, 3:6] = self.inverse, 0.5 * np.eye(3), -spin
-        # In periods and shares of the moments, so that the series ends.
-        units = np.diag([self.h] * 3 + [1.0] * 3 + [self.h**2 / np.trace(self.J)] * 3)
-        M = units @ (self.h * M) @ np.linalg.inv(units)
-        total, term = np.broadcast_to(np.eye(9), M.shape).copy(), np.broadcast_to(np.eye(9), M.shape)
-        for k in range(1, 16):
-            term = term @ M / k
-            total += term
-        total = np.linalg.inv(units) @ total @ units
+        total = expm(self.h * M)
         return total[:, :6, :6], total[:, :6, 6:]
 
     def moves(self, w, n):

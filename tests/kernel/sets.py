@@ -5,7 +5,7 @@ from fractions import Fraction
 from functools import cache
 
 from starhold.algebra.polynomial import Polynomial
-from starhold.algebra.scalar import clip, less, maximum, sign, where
+from starhold.algebra.scalar import clip, maximum, sign
 from starhold.certification.invariant.prover import Attempt, proved, scales
 from starhold.certification.invariant.theorems import program
 from starhold.kernel.numbers import rational
@@ -63,12 +63,6 @@ def sliding(x, y):
 
 def saturated(x, s, r):
     return r * s - x, s - clip(2 * s, 1.0)
-
-
-def switching(x, y):
-    circle, r = round_(x, y) - 2 * x, round_(x, y)
-    above = where(less(0.0, circle), r * y, 2 * x * y), where(less(0.0, circle), r * (1 - x), y * y - x * x)
-    return where(less(0.0, y), above[0], y), where(less(0.0, y), above[1], -2 * x - 3 * y)
 
 
 SETS = {

@@ -5,16 +5,14 @@ from functools import cache
 
 import numpy as np
 
-import starhold as sh
 from starhold.algebra.vector import ZERO
 from starhold.certification.evidence.finding import certificate as contents
 from starhold.certification.station import certify_station
 from starhold.laws import l2_circle, l2_equilibrium
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState
-from starhold.scenario.building import build
 from tests.kernel.oracle import number, run
-from tests.making import point_loop
+from tests.making import built, point_loop
 
 PLANT = PRIMARIES["sun-earth"].point("L2")
 BEST = l2_circle.design(PLANT, l2_circle.Best(1.0))
@@ -35,8 +33,7 @@ def loop_of(gains=BEST, limit=math.inf, kind="norm", plant=PLANT, **changes):
 @cache
 def flown(scenario, law):
     """The certificate of a law of a built-in scenario."""
-    given = sh.load(scenario)
-    return certify_station(build(given, given.pick(law)), law)
+    return certify_station(built(scenario, law), law)
 
 
 def proof(certificate, *kept):

@@ -14,6 +14,7 @@ from starhold.certification.subject import make_subject
 from starhold.kernel.numbers import rational
 from starhold.scenario.building import build
 from starhold.scenario.reading import make_scenario
+from tests.kernel.flights import along, turned_on
 from tests.kernel.programs import run, written
 
 MOMENTS, MODES = [20.0, 30.0, 25.0], [[1.2, 0.01, 1.5, 0.2, 0.0, 0.0], [2.6, 0.01, 0.0, 1.0, 1.4, 0.0]]
@@ -220,7 +221,7 @@ class Swaying:
         if not off and not rate:
             return q, w
         a, b = (self.rng.normal(size=w.shape) for _ in range(2))
-        return misled(q, w, off * along(a), rate * along(b))
+        return turned_on(q, off * along(a)), w + rate * along(b)
 
     def later(self, x, torque, s):
         """States after so many seconds."""
@@ -233,7 +234,7 @@ class Swaying:
 
     def after(self, x, outside, error, turned, rate):
         """States after a period in which torques from outside are those of `outside`, one after the other."""
-        u = self.command(*misled(x[:4], x[4:7], turned, rate)) + error
+        u = self.command(turned_on(x[:4], turned), x[4:7] + rate) + error
         for push in outside:
             x = self.later(x, u + push, self.h / len(outside))
         return x
@@ -288,18 +289,6 @@ class Swaying:
             spread = 0.3 / 4.0**k * self.rng.normal(size=ends.shape)
             ends = along(best[:, self.rng.integers(best.shape[1], size=self.lanes)] + spread)
         return found
-
-
-def along(v):
-    """Vectors of no length, or of the length 1."""
-    return v / np.linalg.norm(v, axis=0).clip(1e-300)
-
-
-def misled(q, w, turn, rate):
-    """What a law is told that is off by a rotation and by a rate."""
-    off = np.linalg.norm(turn, axis=0)
-    c, s = np.cos(off / 2), np.sin(off / 2) * along(turn)
-    return np.vstack([q[0] * c - (q[1:] * s).sum(0), q[0] * s + c * q[1:] + np.cross(q[1:].T, s.T).T]), w + rate
 
 
 def programs_of(content, claim):

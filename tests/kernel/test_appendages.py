@@ -25,6 +25,7 @@ from starhold.kernel.taylor import ONE, run, within
 from starhold.kernel.theorems.response import Response
 from starhold.simulation.lane import fly, label
 from tests.kernel.certificates import failing
+from tests.kernel.flights import turned_on
 from tests.kernel.oracle import number
 from tests.kernel.programs import run as run_in_floats
 from tests.kernel.swaying import MODES, MOMENTS, Swaying, content_of, found, loop_of
@@ -357,22 +358,10 @@ def test_a_period_exceeds_its_bounds_without_a_term(name, monkeypatch):
             for rows, rest in ((period.grown, period.more), (period.between, period.far))
         ]
         d, e, a, b = (v[:, None] / np.linalg.norm(v) for v in random.normal(size=(4, 3)))
-        half = sizes["error.attitude"] / 2
-        turn = np.vstack([[[np.cos(half)]], np.sin(half) * a])
-        q = np.vstack(
-            [
-                x[:1] * turn[:1] - (x[1:4] * turn[1:]).sum(0),
-                x[:1] * turn[1:] + turn[:1] * x[1:4] + np.cross(x[1:4].T, turn[1:].T).T,
-            ]
-        )
+        q = turned_on(x[:4], sizes["error.attitude"] * a)
         u = against.command(q, x[4:7] + sizes["error.rate"] * b) + sizes["error"] * e
         for _ in range(20):
-            s = float(motion.h) / 20
-            torque = u + sizes["outside"] * d
-            one = against.rates(x, torque)
-            two = against.rates(x + s / 2 * one, torque)
-            three = against.rates(x + s / 2 * two, torque)
-            x = x + s / 6 * (one + 2 * two + 2 * three + against.rates(x + s * three, torque))
+            x = against.later(x, u + sizes["outside"] * d, float(motion.h) / 20)
             size = np.abs(np.vstack([x[4:7], x[1:4], x[7:]]))
             worst = max(worst, float((size / bounds[1].clip(1e-12)).max()))
         worst = max(worst, float((against.modes(x) / bounds[0].clip(1e-12)).max()))

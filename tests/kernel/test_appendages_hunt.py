@@ -13,10 +13,10 @@ from starhold.certification.evidence.finding import certificate
 from starhold.certification.subject import make_subject
 from starhold.errors import InputError
 from starhold.kernel.check import check
-from starhold.scenario.building import build
 from starhold.scenario.reading import make_scenario
 from tests.certification.hunt import random_inertia
 from tests.kernel.swaying import Swaying
+from tests.making import built
 
 
 def random_loop(random):
@@ -46,8 +46,7 @@ def random_loop(random):
         "part": [part, *more],
         "law": [{"type": law, "k_rate": d, "k_attitude": k, "quaternion_sign": sign}],
     }
-    scenario = make_scenario(tables)
-    return build(scenario, scenario.laws[0])
+    return built(make_scenario(tables))
 
 
 def modes_of(random, least, w):

@@ -1,5 +1,4 @@
-"""False claims about loops with appendages of which all is shown but one thing: that thing is not
-idle."""
+"""False claims about loops with appendages of which all is shown but one thing: that thing is not idle."""
 
 import copy
 import random

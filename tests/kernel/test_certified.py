@@ -6,17 +6,15 @@ from functools import cache
 
 import pytest
 
-import starhold as sh
 from starhold.certification.certificate import write
 from starhold.certification.certify import certify
 from starhold.checker import check, passed
-from starhold.scenario.building import build
+from tests.making import built
 
 
 @cache
 def loop_of(scenario, law):
-    given = sh.load(scenario)
-    return build(given, given.pick(law))
+    return built(scenario, law)
 
 
 @cache

@@ -30,14 +30,14 @@ from starhold.trace.straight_line import straight_line
 from tests.kernel.certificates import rekeyed, text
 from tests.kernel.mutations import refusals
 from tests.kernel.tumbling import Tumbling
+from tests.making import built
 from tests.tiers import WHOLE
 
 
 @cache
 def tumbling(scenario="cubesat-detumble", law="b-dot"):
     """The certificate of a law, or of the first mode of one."""
-    given = sh.load(scenario)
-    loop = build(given, given.pick(law))
+    loop = built(scenario, law)
     loop = loop if law != "mission" else loop_of_mode(loop, 0)
     found = find_detumbling(make_subject(loop))
     assert not found.failed

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
@@ -24,9 +23,9 @@ from starhold.kernel.numbers import Account, RefusedError, scalar
 from starhold.kernel.polynomials import Poly, var
 from starhold.kernel.regions import ANGLE, AT_REST, RATE, SPEED, STATE, TURN, felt
 from starhold.kernel.theorems.noise import driven
-from starhold.scenario.building import build
 from tests.kernel.flights import Around, Surroundings, along, cross, stepped
 from tests.kernel.oracle import Oracle, run
+from tests.making import built
 from tests.tiers import leading
 
 LANES, PARTS = 60, 8
@@ -37,8 +36,7 @@ SMALL = dict.fromkeys(("target.rate", "target.acceleration", *(f"outside.{k}" fo
 @cache
 def pushed(law):
     """A loop with wheels."""
-    given = sh.load("cubesat-nadir")
-    loop = Loop(make_subject(build(given, given.pick(law))))
+    loop = Loop(make_subject(built("cubesat-nadir", law)))
     return loop, Pushed(loop, Pushes(0.0))
 
 
@@ -302,5 +300,5 @@ def test_what_momentum_adds_to_the_torque_and_to_the_drift_of_the_rates_is_in_th
 
 def test_a_vector_whose_size_is_not_told_is_not_taken_for_zero():
     assert felt([var("w1")], "r", {}) == 0
-    with pytest.raises(RefusedError, match="is not told"):
+    with pytest.raises(RefusedError, match="is not stated"):
         felt([var("h1") * var("w1")], "w", {"h1": Fraction(1)})

@@ -31,6 +31,7 @@ from starhold.simulation.lane import fly, label
 from starhold.studies.compare import record
 from tests.certification.attack import Attack, flown
 from tests.kernel.flights import Around, along
+from tests.making import built
 from tests.parts.files import BODY, FILES, PD, part
 from tests.tiers import leading
 
@@ -41,8 +42,7 @@ LATE = [(("lag", 0.05),), (("rate-limit", 0.1),), (("lag", 0.5),)]
 @cache
 def flying(part, *numbers):
     """A loop with an actuator, and its pointing claim."""
-    given = sh.load("three-laws")
-    loop = build(given, given.pick("lyapunov")).with_parts(fit("actuator", part, *numbers))
+    loop = built("three-laws", "lyapunov").with_parts(fit("actuator", part, *numbers))
     # In steps that follow it almost exactly.
     loop = replace(loop, substeps=40)
     claim, why = pointed(make_subject(loop))
@@ -71,8 +71,7 @@ def test_an_actuator_that_lags_is_in_the_claim_and_no_flight_breaks_it(late):
 def test_one_file_with_an_actuator_that_says_how_late_it_is_is_in_the_claim_checked_and_flown(tmp_path):
     (tmp_path / "drive.py").write_text(FILES["drive.py"])
     text = BODY + "substeps = 8\n" + part('file = "drive.py"\nbandwidth = "2 Hz"\n') + PD
-    scenario = parse(text, "own", tmp_path)
-    loop = build(scenario, scenario.laws[0])
+    loop = built(parse(text, "own", tmp_path))
     claim, _ = pointed(make_subject(loop))
     assert claim.numbers["late_torque"] > 0.0
     (whole,) = named([claim], loop, 0.0)
@@ -211,8 +210,7 @@ def test_what_is_late_in_a_flight_is_within_its_bounds(lag, substeps):
         "simulation": {"duration": "10 s", "control_period": 0.1, "substeps": substeps},
         "law": [{"type": "pd", "k_rate": 0.5, "k_attitude": 0.05}],
     }
-    scenario = sh.scenario(craft)
-    loop = build(scenario, scenario.laws[0])
+    loop = built(sh.scenario(craft))
     late = late_torque(loop)
     run = label(loop, *fly(loop, 1), 1).arrays
     before, after = (run["command"][0] - run["torque"][k] for k in (0, 1))

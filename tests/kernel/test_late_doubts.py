@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import certificate, read
@@ -26,8 +25,8 @@ from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.polynomials import apply, cross, dot
 from starhold.kernel.regions import TURN, settled
 from starhold.parts.catalogue import fit
-from starhold.scenario.building import build
 from tests.kernel.flights import along, rates, stepped
+from tests.making import built
 from tests.tiers import leading
 
 PARTS, LANES = 60, 600
@@ -37,8 +36,7 @@ BALL, AXES = np.diag([2.0, 2.0, 2.0]), np.diag([1.0, 3.0, 3.5])
 @cache
 def plain():
     """A loop without actuators."""
-    given = sh.load("three-laws")
-    loop = Loop(make_subject(build(given, given.pick("lyapunov"))))
+    loop = Loop(make_subject(built("three-laws", "lyapunov")))
     return loop, Pushed(loop, Pushes(0.0))
 
 
@@ -156,8 +154,7 @@ def test_bounds_that_only_grow_are_refused_for_that_and_not_for_how_long_numbers
 @pytest.mark.slow
 @pytest.mark.parametrize(("part", "number"), [("lag", 0.05), ("rate-limit", 0.1)])
 def test_a_claim_says_that_components_near_what_is_asked_for_alike_where_it_uses_it(part, number):
-    given = sh.load("three-laws")
-    loop = build(given, given.pick("lyapunov")).with_parts(fit("actuator", part, number))
+    loop = built("three-laws", "lyapunov").with_parts(fit("actuator", part, number))
     claim, _ = pointed(make_subject(loop))
     one, programs = claim.proof.claim, list(claim.proof.programs.values())
     for alike in (True, False):

@@ -22,12 +22,12 @@ from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.programs import digest
 from starhold.laws import pid
 from starhold.parts.craft import make_craft
-from starhold.scenario.building import build
 from starhold.trace.straight_line import straight_line
 from tests.kernel.certificates import failing, text
 from tests.kernel.mutations import refusals
 from tests.kernel.oracle import is_kept
 from tests.laws.motion import fly
+from tests.making import built
 from tests.tiers import fewer
 
 GAINS = pid.Gains(0.36, 0.036, 8e-4, 2e-4)
@@ -38,8 +38,7 @@ MOMENTS, OUTSIDE, PERIOD = [2.0, 3.0, 4.0], 1e-4, 0.5
 def pointing():
     law = {"type": "pid", **GAINS._asdict()}
     kept = {"simulation": {"duration": "1 min", "control_period": PERIOD}, "name": "pid", "law": [law]}
-    given = sh.scenario({"spacecraft": {"inertia": MOMENTS}} | kept)
-    loop = Loop(make_subject(build(given, given.laws[0])))
+    loop = Loop(make_subject(built(sh.scenario({"spacecraft": {"inertia": MOMENTS}} | kept))))
     assert Pushed(loop, Pushes(OUTSIDE)).find(np.radians(90.0)), loop.failed
     return certificate(loop.programs, loop.claims)
 

@@ -21,11 +21,10 @@ from starhold.kernel.numbers import WORK, Account, RefusedError
 from starhold.kernel.polynomials import poly, var
 from starhold.kernel.programs import Asking, Exactly, Program, known
 from starhold.kernel.theorems.attitude import reduced
-from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from tests.kernel.certificates import contents, text
 from tests.kernel.oracle import Oracle, number
-from tests.making import noise
+from tests.making import built, noise
 from tests.small import CRAFT
 from tests.tiers import leading
 
@@ -42,8 +41,7 @@ chosen that of the energy alone, whose set the one of the same level with a litt
 
 def loop_of(a=ROOT, b=-0.01, sign_policy="as_published", craft=CRAFT, more=""):
     lines = more or f'form = "equal"\na = {a}\nb = {b}\nquaternion_sign = "{sign_policy}"\n'
-    scenario = parse(f'{craft}[[law]]\ntype = "modal"\n{lines}\n', "small")
-    return build(scenario, scenario.laws[0])
+    return built(parse(f'{craft}[[law]]\ntype = "modal"\n{lines}\n', "small"))
 
 
 def shown(loop):

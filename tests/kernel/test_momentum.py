@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
@@ -18,9 +17,9 @@ from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.regions import ANGLE, AT_REST, SPEED, STATE
 from starhold.kernel.theorems.pointing import points
-from starhold.scenario.building import build
 from tests.kernel.flights import Around, Surroundings, along, cross
 from tests.kernel.oracle import Oracle, run
+from tests.making import built
 from tests.tiers import leading
 
 LANES = 2000
@@ -39,8 +38,7 @@ FLOWN = [
 @pytest.mark.parametrize(("scenario", "law", "share"), leading(FLOWN))
 def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, law, share):
     Account.left = 10**12
-    given = sh.load(scenario)
-    loop = Loop(make_subject(build(given, given.pick(law))))
+    loop = Loop(make_subject(built(scenario, law)))
     own = Pushed(loop, pushes(loop.loop, loop.known.envelope(False)))
     _, V, held, _ = own.leans[0]
     oracle = Oracle({"programs": loop.by_digest}, loop.claim("points", own.words, V, **own.numbers))
@@ -104,8 +102,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
 @cache
 def calm():
     """A loop on which almost nothing acts but a torque that the law is told."""
-    given = sh.load("cubesat-nadir")
-    loop = Loop(make_subject(build(given, given.pick("wheel"))))
+    loop = Loop(make_subject(built("cubesat-nadir", "wheel")))
     return loop, Pushed(loop, Pushes(0.0))
 
 
@@ -186,8 +183,7 @@ def test_a_torque_that_is_told_at_a_misread_attitude_is_misread_by_no_more_than_
 def test_a_target_whose_motion_is_misread_moves_the_torque_by_no_more_than_its_bound():
     """What the target is read to turn more, the error is read to turn less, as the body's own rate is read as it is."""
     Account.left = 10**12
-    given = sh.load("cubesat-nadir")
-    loop = Loop(make_subject(build(given, given.pick("lyapunov"))))
+    loop = Loop(make_subject(built("cubesat-nadir", "lyapunov")))
     wrong = pushes(loop.loop, loop.known.envelope(False))._replace(attitude=0.0, rate=0.0)
     wrong = wrong._replace(target_rate=1e-4, target_acceleration=3e-4)
     own = Pushed(loop, wrong)
@@ -210,8 +206,7 @@ def test_a_target_whose_motion_is_misread_moves_the_torque_by_no_more_than_its_b
 def test_a_body_that_leans_on_its_momentum_is_where_it_is_said_to_be_and_stays():
     """Without the lean the push that holds it would be a larger one than is claimed of what is not slow."""
     Account.left = 10**12
-    given = sh.load("cubesat-nadir")
-    loop = Loop(make_subject(build(given, given.pick("lyapunov"))))
+    loop = Loop(make_subject(built("cubesat-nadir", "lyapunov")))
     own = Pushed(loop, pushes(loop.loop, loop.known.envelope(True))._replace(attitude=0.0, rate=0.0))
     held = own.leans[0][2]
     n, A, B = own.numbers, floats(held.near.A), floats(held.near.B)
@@ -228,8 +223,7 @@ def test_a_body_that_leans_on_its_momentum_is_where_it_is_said_to_be_and_stays()
 def test_a_potential_that_is_even_holds_motions_on_one_side_of_a_half_turn():
     """With V the same for both quaternions a set is that with q0 > 0, which no motion may leave within a period."""
     Account.left = 10**12
-    given = sh.load("wheels-orbital")
-    loop = Loop(make_subject(build(given, given.pick("wheel"))))
+    loop = Loop(make_subject(built("wheels-orbital", "wheel")))
     own = Pushed(loop, pushes(loop.loop, loop.known.envelope(False)))
     _, V, held, _ = own.leans[0]
     assert held.even

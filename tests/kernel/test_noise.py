@@ -22,10 +22,10 @@ from starhold.conformance.bench import CRAFT
 from starhold.kernel.numbers import Account
 from starhold.kernel.theorems.noise import tail
 from starhold.parts.estimators import mekf
-from starhold.scenario.building import build
 from tests.kernel.certificates import contents, failing, radii_of
 from tests.kernel.flights import along
 from tests.kernel.oracle import Oracle, number
+from tests.making import built
 from tests.tiers import leading
 
 SIZES = np.repeat([1e-7, 1e-7, 1e-7, 1e-2, 1e-1, 1e-2], 3)
@@ -35,8 +35,7 @@ SIZES = np.repeat([1e-7, 1e-7, 1e-7, 1e-2, 1e-1, 1e-2], 3)
 @pytest.fixture(scope="module")
 def nadir():
     """The CubeSat that points to nadir."""
-    given = sh.load("cubesat-nadir")
-    return build(given, given.pick("wheel"))
+    return built("cubesat-nadir", "wheel")
 
 
 def oracle_of(loop, **more):

@@ -12,9 +12,8 @@ import control
 import numpy as np
 import piqp
 import pytest
-from scipy.linalg import block_diag, expm
+from scipy.linalg import block_diag
 
-import starhold as sh
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.finding import certificate, obligations, read
@@ -25,19 +24,18 @@ from starhold.kernel.plans import Plan
 from starhold.laws import mpc
 from starhold.laws.interface import Measurement
 from starhold.parts.craft import make_craft
-from starhold.scenario.building import build
 from tests.kernel.certificates import failing, rekeyed, text
 from tests.kernel.mutations import refusals
 from tests.kernel.oracle import Oracle, is_kept
-from tests.kernel.planned import Planned, skew
+from tests.kernel.planned import Planned
 from tests.kernel.programs import number
+from tests.making import built
 from tests.tiers import fewer
 
 
 @cache
 def loop_of(name):
-    scenario = sh.load(name)
-    return build(scenario, scenario.pick("mpc"))
+    return built(name, "mpc")
 
 
 @cache
@@ -197,21 +195,6 @@ def test_moves_are_those_of_the_discrete_regulator():
     np.testing.assert_allclose(plan.P, P, rtol=1e-7, atol=1e-6)
 
 
-def test_the_other_reading_samples_the_motion():
-    oracle = oracle_of("three-laws")
-    plan, (w, n) = planned(oracle), oracle.rng.normal(size=(2, 3, 5))
-    A, B = plan.motion(w, n)
-    for k in range(5):
-        one = [x[:, k : k + 1] for x in (w, n)]
-        M, spin = np.zeros((9, 9)), skew(one[0])[0]
-        pull = plan.strength * (skew(one[1])[0] @ plan.J @ skew(one[1])[0] - skew(plan.J @ one[1])[0] @ skew(one[1])[0])
-        M[:3, :3], M[:3, 3:6] = plan.inverse @ (skew(plan.J @ one[0])[0] - spin @ plan.J), plan.inverse @ pull
-        M[:3, 6:], M[3:6, :3], M[3:6, 3:6] = plan.inverse, 0.5 * np.eye(3), -spin
-        wanted = expm(plan.h * M)
-        np.testing.assert_allclose(A[k], wanted[:6, :6], atol=1e-13)
-        np.testing.assert_allclose(B[k], wanted[:6, 6:], atol=1e-13)
-
-
 def scaled(part, name, factor):
     def change(claim):
         claim[part][name] = str(rational(claim[part][name]) * factor)
@@ -328,7 +311,7 @@ def test_a_claim_is_compared_with_the_plan_of_the_loop():
     assert differences(claim, loop) == []
     changes = {
         "the law plans its moves": without("taken", "plan"),
-        "plan.limit is not told": without("subject", "plan.limit"),
+        "plan.limit is not stated": without("subject", "plan.limit"),
         "plan.gap is exceeded": scaled("numbers", "plan.gap", rational("1/2")),
         "plan.stiffness is exceeded": scaled("numbers", "plan.stiffness", rational("1/2")),
         "plan.state.1 is another number": scaled("subject", "plan.state.1", 2),
@@ -337,8 +320,7 @@ def test_a_claim_is_compared_with_the_plan_of_the_loop():
         one = copy.deepcopy(claim)
         change(one)
         assert how in differences(one, loop)
-    scenario = sh.load("three-laws")
-    assert "its law does not plan" in differences(claim, build(scenario, scenario.pick("lyapunov")))
+    assert "its law does not plan" in differences(claim, built("three-laws", "lyapunov"))
 
 
 def test_a_law_that_takes_the_body_for_another_one_has_no_claim():

@@ -271,7 +271,7 @@ def test_numbers_without_a_sense_are_refused(kind, name, key, value):
         shape = [[str(int(i == k)) for k in range(6)] for i in range(6)]
         told["ellipsoids"] = [{"shape": shape, "shares": ["1/4"] * 3, "rate": "1/2", "reach": "2"}]
     told[f"{kind}s"][0][key] = value
-    with pytest.raises(RefusedError, match=f"an? {kind} is not properly told"):
+    with pytest.raises(RefusedError, match=f"an? {kind} is not properly stated"):
         check(text(content))
 
 

@@ -11,7 +11,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-import starhold as sh
 from starhold.analysis.trial import BrokenClaimError, fly_claims
 from starhold.certification.certificate import Certificate, write
 from starhold.certification.certify import Wanted, certify
@@ -30,11 +29,11 @@ from starhold.kernel.theorems import THEOREMS, refuted
 from starhold.laws import lqr, matrix_pd, pd
 from starhold.laws.sliding import Gains as Sliding
 from starhold.parts.environments.gravity_gradient import gravity_gradient
-from starhold.scenario.building import build
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of
 from tests.kernel.certificates import text
 from tests.kernel.mutations import refusals
 from tests.kernel.oracle import Oracle, run
+from tests.making import built
 from tests.tiers import WHOLE, leading
 
 SKEWED = ((0.01, 0.02, 0.0), (0.02, 0.01, 0.0), (0.0, 0.0, 0.01))
@@ -322,6 +321,5 @@ def test_nothing_false_is_accepted(name):
 
 
 def test_where_v_rises_nowhere_nothing_is_refuted():
-    given = sh.load("three-laws")
-    loop = Loop(make_subject(build(given, given.pick("lyapunov"))))
+    loop = Loop(make_subject(built("three-laws", "lyapunov")))
     assert not against_far(loop, 0.1)

@@ -26,11 +26,11 @@ from starhold.kernel.numbers import Account, RefusedError, rational
 from starhold.kernel.regions import RATE, TURN
 from starhold.parts.craft import tensor
 from starhold.parts.environments.gravity_gradient import gravity_gradient
-from starhold.scenario.building import build
 from tests.kernel.certificates import rekeyed, text
 from tests.kernel.flights import along, moved
 from tests.kernel.mutations import refusals
 from tests.kernel.oracle import is_kept
+from tests.making import built
 from tests.tiers import fewer
 
 MOMENTS, TOLERANCE, FAR, OUTSIDE = [2.0, 3.0, 4.0], 0.03, 0.08, 1e-5
@@ -40,8 +40,7 @@ LAW = {"type": "lyapunov", "k_rate": 0.5, "k_attitude": 0.05}
 def loop_of(**tables):
     given = {"name": "off", "spacecraft": {"inertia": MOMENTS}, "law": [LAW]}
     given |= {"simulation": {"duration": "1 min", "control_period": 0.1}}
-    scenario = sh.scenario(given | tables)
-    return build(scenario, scenario.laws[0])
+    return built(sh.scenario(given | tables))
 
 
 @cache

@@ -7,25 +7,11 @@ import numpy as np
 
 from starhold.kernel.numbers import rational
 from starhold.trace.straight_line import evaluated
+from tests.kernel.flights import along, cross, seen, stepped
 
 SUBSTEPS, PERIODS = 6, 4
 SLACK = 1e-9
 """Of the kinetic energy, for floats."""
-
-
-def cross(a, b):
-    return np.cross(a.T, b.T).T
-
-
-def unit(a):
-    return a / np.maximum(np.linalg.norm(a, axis=0), 1e-300)
-
-
-def turned(q, v):
-    """A vector in body axes, of the quaternions (4, n) that turn inertial axes to these."""
-    w, u = q[0], -q[1:]
-    t = 2.0 * cross(u, v)
-    return v + w * t + cross(u, t)
 
 
 class Tumbling:
@@ -84,35 +70,35 @@ class Tumbling:
         q = np.zeros((4, count))
         q[0] = 1.0
         strength = s["field.least"] * (1.0 + np.abs(x[18]) * (x[18] > 0.0))
-        B = unit(x[:3]) * strength
+        B = along(x[:3]) * strength
         # Rates mostly along the field, where little opposes them, and as fast as may be.
         share = np.exp(1.5 * x[3] - 1.5)
-        w = unit(unit(B) * np.sign(x[4]) + share * x[5:8]) * limit * (1.0 - 0.02 * np.abs(x[8]))
-        stored = unit(x[9:12]) * s["stored"] if self.wheels else np.zeros((3, count))
+        w = along(along(B) * np.sign(x[4]) + share * x[5:8]) * limit * (1.0 - 0.02 * np.abs(x[8]))
+        stored = along(x[9:12]) * s["stored"] if self.wheels else np.zeros((3, count))
         kind = np.sign(x[15])
         memory, known, dipole = np.zeros((3, count)), 0.0, np.zeros((3, count))
         breach, fastest = np.zeros(count), [np.zeros(count)]
-        seen = []
+        sights = []
         for k in range(PERIODS):
             if k:
                 # Against the way in which the field turns in the body, or another one.
                 apparent = -cross(B / np.linalg.norm(B, axis=0), self.inertial(q, w))
-                way = unit(np.where(x[16] > 0.0, unit(apparent) * np.sign(x[17]), 0.0) + 0.3 * x[12:15])
+                way = along(np.where(x[16] > 0.0, along(apparent) * np.sign(x[17]), 0.0) + 0.3 * x[12:15])
                 B = B + way * s["field.change"] * h * np.linalg.norm(B, axis=0) / (1.0 + s["field.change"] * h)
                 size = np.linalg.norm(B, axis=0)
                 B = B * np.maximum(1.0, s["field.least"] / size)
-            f = turned(q, B)
+            f = seen(q, B)
             torque, memory, known = self.command(f, memory, known)
             dipole = cross(f, torque) / (f * f).sum(axis=0)
             dipole = dipole / np.maximum(1.0, np.abs(dipole).max(axis=0) / s["dipole.limit"])
             before, energy = q, self.energy(w)
             q, w, most = self.carried(q, w, B, dipole, stored, kind, h)
             fastest.append(np.maximum(most, 0.0))
-            seen.append((before, B))
+            sights.append((before, B))
             if k >= 2:
-                last, _ = seen[k - 1]
+                last, _ = sights[k - 1]
                 b = B / np.linalg.norm(B, axis=0)
-                m = np.linalg.norm(turned(q, b) - turned(last, b), axis=0) / (2.0 * h)
+                m = np.linalg.norm(seen(q, b) - seen(last, b), axis=0) / (2.0 * h)
                 slow = np.maximum.reduce(fastest[-3:]) <= limit
                 gained = (self.energy(w) - energy) / h - SLACK * energy / h
                 rising = np.maximum(gained / rise if rise > 0.0 else 2.0 * (gained > 0.0), 0.0)
@@ -122,7 +108,7 @@ class Tumbling:
         return breach
 
     def inertial(self, q, v):
-        return turned(np.vstack([q[:1], -q[1:]]), v)
+        return seen(np.vstack([q[:1], -q[1:]]), v)
 
     def energy(self, w):
         return 0.5 * (w * (self.J @ w)).sum(axis=0)
@@ -140,20 +126,15 @@ class Tumbling:
         step, most, s = h / SUBSTEPS, np.linalg.norm(w, axis=0), self.acts
 
         def rates(q, w):
-            f = turned(q, B)
-            across = w - unit(f) * (unit(f) * w).sum(axis=0)
-            pushed = unit(w) * s["outside"] + unit(across) * s["outside.across"]
+            f = seen(q, B)
+            across = w - along(f) * (along(f) * w).sum(axis=0)
+            pushed = along(w) * s["outside"] + along(across) * s["outside.across"]
             torque = cross(dipole, f) + np.where(kind > 0.0, 1.0, 0.2) * pushed - cross(w, stored)
             out = evaluated(self.programs["body"], rate=w, torque=torque, craft=self.plant)
             turn = 0.5 * np.vstack([-(q[1:] * w).sum(axis=0), q[0] * w + cross(q[1:], w)])
             return turn, np.array([np.broadcast_to(part, w[0].shape) for part in out])
 
         for _ in range(SUBSTEPS):
-            a = rates(q, w)
-            b = rates(q + step / 2 * a[0], w + step / 2 * a[1])
-            c = rates(q + step / 2 * b[0], w + step / 2 * b[1])
-            d = rates(q + step * c[0], w + step * c[1])
-            q, w = (x + step / 6 * (i + 2 * j + 2 * k + o) for x, i, j, k, o in zip((q, w), a, b, c, d, strict=True))
-            q = q / np.linalg.norm(q, axis=0)
+            q, w = stepped(rates, (q, w), step)
             most = np.maximum(most, np.linalg.norm(w, axis=0))
         return q, w, most

@@ -215,6 +215,8 @@ BROKEN = {
                              "annotated with a Quantity"),
     "a reading that is none of the state": ("sensor", "    rate: Annotated", "    spin: Annotated",
                              'FIRST = {"spin": 0.0}'),
+    "a reading that estimators state": ("sensor", "    rate: Annotated", "    is_valid: Annotated",
+                                       "found a reading is_valid"),
     "an equation ends the program": ("sensor", "    return Reading(", "    raise SystemExit\n    return Reading(",
                              "mine.py, line 27: SystemExit"),
     "needs that fail": ("estimator", "def remember", "def needs(params):\n    return params.sahre\n\n\ndef remember",

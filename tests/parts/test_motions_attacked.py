@@ -206,12 +206,7 @@ SHARP = {
     "ground-strip": (0.8, 0.51),
 }
 """The shares of the bounds of rate and acceleration that are reached: those that are halved are noticed."""
-SHARPNESS = {
-    "scan": (1.01, 1.01),
-    "yaw-steering": (1.1, 1.3),
-    "ground-station": (1.02, 1.6),
-    "ground-strip": (1.2, 2.3),
-}
+SHARPNESS = {"scan": (1.01, 1.01), "yaw-steering": (1.1, 1.3), "ground-station": (1.02, 1.6), "ground-strip": (1.2, 2.3)}
 """How many times what is reached on a circle 550 km high a bound of rate, and of acceleration, is at most."""
 
 

@@ -17,6 +17,7 @@ from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
 from starhold.studies.compare import build, compare, fly_law
 from starhold.studies.flight import Flight
+from tests.making import built
 from tests.tiers import leading
 
 
@@ -85,8 +86,7 @@ PAIRS = {"l2-circle": "smooth", "l2-deficit": "deficit 10", "l2-nonlinear": "ful
 
 @pytest.mark.parametrize(("scenario_name", "law"), leading(PAIRS.items(), 3))
 def test_scipy_flies_the_same_in_the_limit_of_small_periods(scenario_name, law):
-    scenario = load(scenario_name)
-    loop = build(scenario, scenario.pick(law))
+    loop = built(scenario_name, law)
     plant, length = loop.craft, 1.2 * math.pi
     motion = linear if loop.has("linear-gravity") else nonlinear
     limit, size = LIMITS[loop.limit], loop.saturation_limit()

@@ -16,6 +16,7 @@ from starhold.report.page import render
 from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
+from tests.making import built
 from tests.report import flown
 from tests.report.reader import Reader
 from tests.small import CRAFT, MPC, PD, WEAK
@@ -102,8 +103,7 @@ def test_a_law_without_claims_says_so() -> None:
 
 
 def test_pages_begin_with_why_nothing_is_claimed_of_the_loop_as_it_flies() -> None:
-    given = parse(CRAFT + PD, "test")
-    certificate = certify(build(given, given.laws[0]), "pd")
+    certificate = certify(built(parse(CRAFT + PD, "test")), "pd")
     found = told(certificate)
     assert plain(found.text).index("not sought") < plain(found.text).index("Converges")
     for text in (found.text, Reader(proofs([replace(flown.flights()[0], certificates=(certificate,))])).text):

@@ -60,8 +60,7 @@ def choices() -> dict[str, Any]:
         for cover, kind in zip(SIGN_POLICIES, KINDS, strict=True)
     }
     for name, path in (("every function, the time", FUNCTIONS), ("a law that reads validity", CAUTIOUS)):
-        read = load(path)
-        found[name] = build(read, read.laws[0])
+        found[name] = built(path)
     found["orbital target"] = plain.without("target").with_parts(ORBITAL)
     times = np.arange(12) * 10.0
     table = tabulate(times, np.array(random_quaternions(12)), np.arange(1101) * plain.period)

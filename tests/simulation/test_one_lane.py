@@ -6,11 +6,10 @@ import pytest
 
 from starhold.loop.kernels import Numbers, make_step
 from starhold.loop.programs import one
-from starhold.scenario.building import build
-from starhold.scenario.reading import load
 from starhold.trace.ordering import ordered
 from starhold.trace.program import Call, Loop, Op, statements
 from starhold.trace.rows import unrolled
+from tests.making import built
 
 STEPS = {
     # At most so many statements of a step, and at least so many rows that are computed with others.
@@ -27,8 +26,7 @@ STEPS = {
 
 @cache
 def program(name, by_rows=True):
-    scenario = load(name)
-    loop = build(scenario, scenario.laws[0])
+    loop = built(name)
     return one(make_step(loop.composition()), loop.carry(), Numbers.of(loop.phases(1)[0]), loop.substeps, by_rows)
 
 

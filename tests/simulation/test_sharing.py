@@ -71,8 +71,7 @@ def counted(halves):
 
 @pytest.mark.parametrize("name", builtin_names())
 def test_a_step_has_no_more_arithmetic_than_before(name):
-    scenario = load(name)
-    loop = build(scenario, scenario.laws[0])
+    loop = built(name)
     found = counted(halves_of(loop, starts_of(loop))[0])
     assert all(now <= before for now, before in zip(found, STEP[name], strict=True)), found
 
@@ -88,8 +87,7 @@ def always(block):
 
 
 def test_ideal_bearings_the_shadow_steps_without_a_new_attitude_and_limits_of_dipoles_cost_a_lane_nothing():
-    scenario = load("cubesat-nadir")
-    loop = build(scenario, scenario.laws[0])
+    loop = built("cubesat-nadir")
     halves = halves_of(loop, starts_of(loop))[0]
     *functions, main = halves[1].functions
     quiet = halves[1]._replace(functions=(*functions, main._replace(body=always(main.body))))
@@ -108,8 +106,7 @@ def lanes_end_as_flights_alone(loops, starts, steps):
 
 
 def three_laws():
-    scenario = load("three-laws")
-    return build(scenario, scenario.pick("lyapunov"))
+    return built("three-laws", "lyapunov")
 
 
 def test_an_orbit_that_differs_is_not_shared():

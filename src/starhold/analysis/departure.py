@@ -106,10 +106,9 @@ def departures(
     last: int | None = None,
     change: str = CHANGES,
 ) -> dict[str, tuple[Departure, ...]]:
-    """Return for each kind of proved claim about motions its departures in a run, in order of time; empty if there are
-    none. loop: the certificate's loop, flown from control step `first` until it changes at `last` (None: never), for the
-    reason `change`. Torque held between samples counts as a departure unless a proof allows it.
-    """
+    """Return for each kind of proved claim about motions its departures in a run, in order of time; empty if there are none.
+    loop: the certificate's loop, flown from control step `first` until it changes at `last` (None: never), for the reason
+    `change`. Torque held between samples counts as a departure unless a proof allows it."""
     span = Span(loop, run, first, last)
     common = [] if span.changes is None else [Departure(span.changes, change)]
     if not len(span["time"]):

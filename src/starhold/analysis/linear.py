@@ -304,8 +304,7 @@ def _remembered(law: System) -> System:
 
 def sampled(plant: System, period: float, delay: float = 0.0) -> System:
     """Return the exact discretisation of a plant for a command that is held for a period and acts `delay` (s) later, and a
-    held disturbance. Pending commands are states (Astrom and Wittenmark, Computer-Controlled Systems, 1997).
-    """
+    held disturbance. Pending commands are states (Astrom and Wittenmark, Computer-Controlled Systems, 1997)."""
     size = len(plant.states)
     whole = int(np.floor(delay / period * (1.0 + 1e-12)))
     rest = max(0.0, delay - whole * period)

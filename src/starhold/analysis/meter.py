@@ -1,8 +1,7 @@
 """Metrics of flights: notes (accumulated numbers) that an equation takes at each control instant, and the metrics computed
 from them at the end. The same notes are taken inside a kernel, for many flights at once without storing samples, and from a
 recording, whose samples are the instants. A row of a table defines how a metric follows from the notes; the report's page
-reads that table too.
-"""
+reads that table too."""
 
 import itertools
 import math

@@ -68,8 +68,7 @@ def spacing(runs: int, instants: int, length: int) -> int:
 def shortfall(apart: int, length: int) -> float:
     """Return a bound on the share by which the largest relative error is underestimated if windows begin `apart` instants
     apart. Any window and the nearest one used that contains the same instant differ by k < apart instants at either end.
-    With M the largest relative error of all windows, their means differ by at most 2 k M / (length - k).
-    """
+    With M the largest relative error of all windows, their means differ by at most 2 k M / (length - k)."""
     return min(1.0, 2.0 * (apart - 1) / (length - apart + 1))
 
 

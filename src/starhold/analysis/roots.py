@@ -126,10 +126,9 @@ def search(
     notice: Callable[[int, int], None] = lambda done, total: None,
     threads: int | None = None,
 ) -> list[Found]:
-    """Return the best of all roots (n,) for each angle, within `limits` and within `eased`, which are no tighter. Every
-    root is flown until it leaves the eased limits, takes longer than the best so far, or ends. `notice` is called with the
-    number of angles done and their total.
-    """
+    """Return the best of all roots (n,) for each angle, within `limits` and within `eased`, which are no tighter. Every root
+    is flown until it leaves the eased limits, takes longer than the best so far, or ends. `notice` is called with the number
+    of angles done and their total."""
     answers: list[Found] = []
     work = partial(_best, problem, problem.watcher(), np.sort(np.asarray(roots, dtype=float)), limits, eased)
     with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:

@@ -80,7 +80,11 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     most = math.pi if one_sided else 2.0 * math.pi
     free, states = _paced(free, certificate, draw(flights, height, level, random, most), random)
     highest, torque = 0.0, 0.0
-    for batch, share in falling(free, certificate, claim, states, _value(free, programs), 1e-15 * top):
+
+    def value(states: Any) -> Any:
+        return value_of(programs, free, shown_at(free, _states(free, states)))
+
+    for batch, share in falling(free, certificate, claim, states, value, 1e-15 * top):
         highest = max(highest, share)
         if _limited(claim):
             torque = max(torque, _need(batch.states, loop, claim))
@@ -325,11 +329,6 @@ def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: n
     total *= wheels["total_momentum"] * random.uniform(size=states.shape[1]) ** (1.0 / 3.0) / np.linalg.norm(total, axis=0)
     kept = begun + shares @ (begun @ axes)
     return kept[:, None] - shares @ (total - tensor(loop.craft.inertia) @ states[ROWS.rate])
-
-
-def _value(loop: ClosedLoop, programs: Any) -> Height:
-    """Return V of the states as the law measures them."""
-    return lambda states: value_of(programs, loop, shown_at(loop, _states(loop, states)))
 
 
 def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:

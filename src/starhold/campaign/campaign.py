@@ -94,8 +94,7 @@ def fly_campaign(
 ) -> CampaignResult:
     """Fly the campaign of a scenario's [campaign] table into a folder, for one law or all, and return its result. InputError
     for any mistake in it, and where flying fails: the runs flown until then are kept, and `resume` continues from there. The
-    results are the same for any engine and any chunk size.
-    """
+    results are the same for any engine and any chunk size."""
     laws = tuple(entry.name for entry in scenario.laws) if law is None else (scenario.pick(law).name,)
     job = begin(scenario, laws)
     table, engine = job.table, options.engine or Threads(os.cpu_count() or 1)

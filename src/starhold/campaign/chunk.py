@@ -45,8 +45,7 @@ class Chunk:
 
 def merge(parts: Iterable[tuple[Counts, Extremes]]) -> tuple[Counts, Extremes]:
     """Merge the counts and extremes of several chunks, with the same bits for any order and grouping of the parts.
-    ValueError where two parts have different names or shapes.
-    """
+    ValueError where two parts have different names or shapes."""
     counts: Counts = {}
     extremes: Extremes = {}
     for number, (more, others) in enumerate(parts):

@@ -163,12 +163,16 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
     scenario, table = readings[0].scenario, readings[0].table
     tables, body = read_toml(scenario.text, scenario.where), scenario.hooks
     nominal: dict[str, Any] = {}
+    designed = any("form" in one for law in tables["law"] for one in (law, *law.get("mode", ())))
     for reading in readings:
         key, path = reading.place.key, reading.place.path
         name = str(path[0])
-        modelled = name in body.modelled or (name in body.designed and _designs(tables) and key not in scenario.table.shared)
+        modelled = name in body.modelled or (name in body.designed and designed and key not in scenario.table.shared)
         unknown = "mounting_error" in path
-        computed = name == "part" and _is_known(scenario, tables["part"], int(path[1]), str(path[2]))
+        computed = name == "part" and (
+            scenario.parts[int(path[1])].part.is_known(str(path[2]))
+            or is_assumed(scenario.parts, tables["part"], int(path[1]), str(path[2]))
+        )
         if computed and not table.known_to_law:
             raise reading.place.refuse("known_to_law", "false", "true, because laws compute their commands with this number")
         if name == "fault" and table.known_to_law:
@@ -185,13 +189,3 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
         if modelled and (name in given or not table.known_to_law):
             nominal[name] = given.get(name, tables.get(name, {}))
     return nominal
-
-
-def _is_known(scenario: Scenario, tables: Any, place: int, key: str) -> bool:
-    """Return whether a law or an estimator uses the parameter `key` of a part."""
-    return scenario.parts[place].part.is_known(key) or is_assumed(scenario.parts, tables, place, key)
-
-
-def _designs(tables: Mapping[str, Any]) -> bool:
-    """Return whether a law, or a law of one of its modes, has a design form."""
-    return any("form" in one for law in tables["law"] for one in (law, *law.get("mode", ())))

@@ -165,8 +165,7 @@ class PairDriver(_Driver):
 @dataclass(frozen=True)
 class Drivers:
     """Drivers of failures and metrics, strongest first in each list, including all that were tested. `skipped` names inputs
-    that are constant or lack values, `remark` the tests left out because of too few runs.
-    """
+    that are constant or lack values, `remark` the tests left out because of too few runs."""
 
     runs: int
     failures: int
@@ -179,8 +178,7 @@ class Drivers:
 
 def find_drivers(inputs: Mapping[str, NDArray], failed: NDArray[np.bool_], metrics: Mapping[str, NDArray]) -> Drivers:
     """Return the drivers of failures and metrics. inputs: columns (n,) with a number or a word per run, one column for each
-    component of a vector; failed: a mask (n,); metrics: columns (n,), NaN where a run does not have the metric.
-    """
+    component of a vector; failed: a mask (n,); metrics: columns (n,), NaN where a run does not have the metric."""
     failed = np.asarray(failed, dtype=bool)
     failures, passed = int(failed.sum()), int((~failed).sum())
     columns = {name: Column(name, np.asarray(values)) for name, values in inputs.items()}

@@ -1,7 +1,6 @@
 """Engines fly the blocks of a campaign in this process, in processes on this machine, on its GPU, or on a Dask cluster. One
 task is one block of runs, never a single run. Results return to this process, which alone writes them; only a few blocks per
-worker are in flight at once, so memory stays bounded for any number of runs.
-"""
+worker are in flight at once, so memory stays bounded for any number of runs."""
 
 from __future__ import annotations
 
@@ -69,8 +68,7 @@ class Workers:
 @dataclass(frozen=True)
 class Scheduler:
     """An existing Dask cluster, given by its scheduler's address such as `tcp://host:8786`. patience: seconds to wait for a
-    worker at the start and after all were lost.
-    """
+    worker at the start and after all were lost."""
 
     address: str
     patience: float = 60.0
@@ -93,8 +91,7 @@ def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
     """Yield the function that flies blocks of a job, at most `most` at a time, once workers are started or reached.
     InputError where the job raises one or fails; where workers cannot be started or reached, have other versions of the
     packages, or compute different bits; and where all workers, or the scheduler, are lost. Results returned before an error
-    or a KeyboardInterrupt are complete.
-    """
+    or a KeyboardInterrupt are complete."""
     if isinstance(engine, Threads):
         with ThreadPool(engine.count) as pool:
             yield lambda blocks: _fly_here(job, blocks, pool)

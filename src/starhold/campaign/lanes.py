@@ -1,7 +1,6 @@
 """Converts drawn values to the numbers that kernels fly: for many runs at once where this gives the same bits as each run's
 own scenario, else run by run. Scenarios with other values are built and compared to determine which numbers of a loop a
-value changes.
-"""
+value changes."""
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -51,8 +50,7 @@ class Lot:
 class Lanes:
     """The lanes of one law of a scenario under a plan of draws. moved: indices of the loop's numbers that each dispersion
     changes; at_once: whether numbers of many runs are made at once; flown: names of the numbers that are read back from the
-    loop.
-    """
+    loop."""
 
     def __init__(self, scenario: Scenario, law: str, plan: Plan) -> None:
         self.scenario, self.law, self.plan = scenario, law, plan
@@ -177,8 +175,7 @@ class Lanes:
 
     @cached_property
     def _follows(self) -> dict[int, str]:
-        """The column of the drawn value that a number equals, by the index of each such number, judged by the first
-        run."""
+        """The column of the drawn value that a number equals, by the index of each such number, judged by the first run."""
         followed: dict[int, str] = {}
         for dispersion in self.plan.dispersions:
             for place in self.moved[dispersion.called] - {_FORM}:

@@ -32,8 +32,7 @@ class Manifest:
     each law and of a full chunk; results do not depend on `chunk`. seed: that of the draws. extensible: whether the draws of
     a run are the same for any number of runs, which is false for Latin hypercubes. columns: names of the columns of each
     law, known once its first chunk is stored. folder, allow_unstable: the folder to which file names in the text are
-    relative, and whether gains known to be unstable are accepted; results depend on neither.
-    """
+    relative, and whether gains known to be unstable are accepted; results depend on neither."""
 
     scenario: str
     text: str

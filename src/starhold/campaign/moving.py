@@ -1,7 +1,6 @@
 """Computes a loop's numbers from drawn values by one equation, recorded once and evaluated for all lanes at once. A law's
 designed gains, and numbers that a part prepares without a recordable equation, are computed separately, if necessary lane by
-lane.
-"""
+lane."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -117,7 +117,7 @@ def look(job: Job, law: str, threads: int, notice: Notice | None = None) -> tupl
     notice: called with the law and how many more are flown, and what for."""
     watching = Job(job.source, job.table, extras=(PREMISES,))
     lanes = watching.lanes(law)
-    names = {name for places in lanes.moved.values() for name in _names(lanes.base.names, places)}
+    names = {lanes.base.names[place] if place >= 0 else "" for places in lanes.moved.values() for place in places}
     alike = all(name.startswith(START) for name in names)
     runs = min(job.table.runs, MOST if alike else APART)
     tell = partial(notice or (lambda law, more, sought: None), law, sought=Sought("proof", runs))
@@ -171,11 +171,6 @@ def _subjects(job: Job, law: str) -> tuple[list[Subject], dict[int | None, tuple
             lacking[one.mode] = one.certificate.name, lacks
     proved = {one.issued.mode for one in subjects}
     return subjects, {mode: why for mode, why in reversed(lacking.items()) if mode not in proved}
-
-
-def _names(names: tuple[str, ...], places: set[int]) -> Iterator[str]:
-    """Return the names of numbers, "" for what is none."""
-    return (names[place] if place >= 0 else "" for place in places)
 
 
 def _loops(job: Job, law: str, lot: Lot) -> Iterator[ClosedLoop]:

@@ -25,8 +25,7 @@ _CLOSED = {
 def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> DataFrame:
     """Return the result of one SELECT from `runs`, a view with a row for each stored run of each law, the campaign's columns
     and `law`. Columns that a law lacks are null in its rows, as are numbers that a run lacks. Unusable chunks are left out
-    and reported to `tell`; without it they are an InputError, as is anything that DuckDB refuses.
-    """
+    and reported to `tell`; without it they are an InputError, as is anything that DuckDB refuses."""
     store = Store.open(folder)
     duckdb, dataset = extra("duckdb"), extra("pyarrow.dataset")
     files = {law: [str(file.path) for file in store.files(law)] for law in store.manifest.laws}

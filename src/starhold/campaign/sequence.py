@@ -91,8 +91,7 @@ def bounds(failures: int, runs: int, confidence: float) -> Bounds:
 def decided(failures: int, runs: int, share: float, confidence: float) -> Literal["met", "missed"] | None:
     """Return "met" if `failures` among `runs` decide that at least `share` of all flights meet a requirement, "missed" if
     they decide that fewer do, else None. Even if this is called after every run until the first answer, each answer is wrong
-    with a probability of at most 1 - `confidence`.
-    """
+    with a probability of at most 1 - `confidence`."""
     require_share("share", share)
     require_share("confidence", confidence)
     require_counts(failures, runs)

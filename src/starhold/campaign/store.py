@@ -50,8 +50,7 @@ class ChunkFile:
 
 class Store:
     """A campaign's folder, open for reading; after `create` or `resume` also for writing. notices: one line for each
-    unusable chunk.
-    """
+    unusable chunk."""
 
     def __init__(self, folder: Path, manifest: Manifest, writing: bool = False) -> None:
         self.folder, self.manifest, self.notices = folder, manifest, list[str]()
@@ -98,8 +97,7 @@ class Store:
     def resume(self, manifest: Manifest) -> Store:
         """Return this campaign opened for more runs, with the numbers of runs and of runs per chunk of the new manifest.
         InputError with the first difference where the new manifest would change results or has fewer runs, and while another
-        process writes into the folder.
-        """
+        process writes into the folder."""
         try:
             _claim(self.folder)
         except OSError as error:
@@ -152,8 +150,7 @@ class Store:
 
     def put(self, chunk: Chunk) -> None:
         """Write a chunk; after the return it survives a crash. InputError where the disk is full or fails. ValueError where
-        its law, runs or columns do not belong to the campaign.
-        """
+        its law, runs or columns do not belong to the campaign."""
         if not self._writing:
             raise ValueError("this store is open for reading only")
         file = self._fit(chunk)

@@ -197,7 +197,7 @@ def judge(
         worst_run=row if run is None else int(run[row]),
         margin_bound=quantile_bound(margins, share, confidence) if independent and not until_decided else None,
         parts=parts,
-        worst_part=max(parts, key=_badness, default=None),
+        worst_part=max(parts, key=lambda x: (SEVERITY.index(x.outcome), x.failures / x.runs, x.upper or 0.0), default=None),
         independent=independent,
         until_decided=until_decided,
         knowledge=knowledge,
@@ -251,10 +251,6 @@ def _parts(known: Mapping[str, NDArray]) -> Iterator[tuple[str, NDArray[np.bool_
             rows = there & (quarter == number)
             if rows.any():
                 yield f"{name} from {_shown(column[rows].min())} to {_shown(column[rows].max())}", rows
-
-
-def _badness(part: Part) -> tuple[int, float, float]:
-    return SEVERITY.index(part.outcome), part.failures / part.runs, part.upper or 0.0
 
 
 def _worst_first(values: ArrayLike) -> NDArray[np.float64]:

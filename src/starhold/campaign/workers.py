@@ -155,8 +155,7 @@ def _end_with_parent() -> None:
 @contextmanager
 def _undisturbed() -> Generator[None]:
     """Defer termination signals until processes are started, because an incompletely started one would print a traceback.
-    Started processes ignore keyboard interrupts, which reach all processes of a terminal; this process ends the others.
-    """
+    Started processes ignore keyboard interrupts, which reach all processes of a terminal; this process ends the others."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -91,8 +91,7 @@ def search(
     no scenario within the box can be flown. begin: a further point (dims,) to search around. The search ends early at a run
     without a value, the worst case. It is an evolution strategy from many starts: a batch of random steps is flown from
     each, and the worst is kept; step sizes adapt, and the less bad half of the starts is dropped after each third of the
-    rounds. notice: called with the law and the number of further flights that are done or no longer needed.
-    """
+    rounds. notice: called with the law and the number of further flights that are done or no longer needed."""
     side = 1.0 if requirement.at_most else -1.0
     evaluations = 0
     sought = np.random.default_rng(seed)
@@ -222,8 +221,7 @@ _FOLLOWING = ("lag", "rate-limit")
 def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | None, str]:
     """Return a bound on a metric that holds for all draws, and its basis; None where none is proved. The saturation limit of
     the command bounds the torque on the body, if no effector produces the torque, no actuator amplifies it, and no draw
-    changes the limit. Claims of certificates hold only for flights that meet their premises; see `proved`.
-    """
+    changes the limit. Claims of certificates hold only for flights that meet their premises; see `proved`."""
     lanes = job.lanes(law)
     loop = lanes.base.loop
     axes = {"peak_torque": 1.0, "peak_torque_norm": math.sqrt(3.0)}.get(requirement.metric)

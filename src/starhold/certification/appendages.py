@@ -1,5 +1,5 @@
-"""The appendages of a loop, whose motion is a program of the kernel: of the equations that fly, with all their numbers; and
-whether laws are told of what effectors store."""
+"""The appendages of a loop, whose motion is a program of the kernel, recorded from the equations that fly, with all their
+numbers; and whether laws know the momentum of effectors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from starhold.trace.straight_line import straight_line
 TAKING = ("command", "switch", "pulse", "push", "bound")
 """Equations of effectors that are no appendages: they take commands, move the orbit, or have a bound of their own."""
 TOLD_MOMENTUM = "measurement.wheel_momentum."
-"""How the inputs of a law's program begin that are what effectors tell it of their momentum."""
+"""The prefix of those inputs of a law's program that contain the momentum of effectors."""
 
 
 def appendages(loop: ClosedLoop) -> tuple[Fitted, ...]:
@@ -40,7 +40,7 @@ def start_of(loop: ClosedLoop) -> list[float]:
 
 
 def appended_motion(loop: ClosedLoop) -> dict[str, Any]:
-    """Record how fast the rate and the state of appendages change, at a rate, a state and a torque on the body."""
+    """Record the derivatives of the rate and of the appendages' states, for a rate, a state and a torque on the body."""
     alone = _alone(loop)
     craft, setup, begun, slope = alone.craft, alone.setup(), alone.carry(), make_step(alone.composition()).slope
 
@@ -51,7 +51,7 @@ def appended_motion(loop: ClosedLoop) -> dict[str, Any]:
         rates, inner, _ = slope(carry, craft, setup)
         return rates[body._fields.index("rate")], inner
 
-    # What depends on where the body is, or how it is turned, has an input that the kernel does not know.
+    # A dependence on the body's position or attitude becomes an input that the kernel does not know.
     given = {"attitude": (1.0, *ZERO), "rate": ZERO, "position": ZERO, "velocity": ZERO, "torque": ZERO}
     return straight_line(motion, **given, state=tuple(start_of(loop)))
 

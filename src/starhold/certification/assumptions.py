@@ -50,7 +50,7 @@ def assumption(identifier: str) -> Assumption:
 
         def late(span: Any) -> Unmet:
             off = np.linalg.norm(span["torque"] - span["command"], axis=1)
-            # Only as the flight begins: what it becomes follows.
+            # Tested only as the flight begins; later errors follow.
             return [(off[:1] > most * MORE, "the torque that acts is further from the command")]
 
         return Assumption(f"a torque that acts within {most:.4g} N m of the command at the start", late)
@@ -120,10 +120,7 @@ def _filled(span: Any) -> Unmet:
 
 def _friction(span: Any) -> Unmet:
     wheels = span.loop.wheels
-    return [
-        (has_friction(wheels), "the wheels have friction"),
-        (bool(wheels.unbalanced), "the rotors are out of balance"),
-    ]
+    return [(has_friction(wheels), "the wheels have friction"), (bool(wheels.unbalanced), "the rotors are out of balance")]
 
 
 def _strayed(span: Any) -> Unmet:
@@ -185,17 +182,17 @@ ASSUMPTIONS = {
     UNLIMITED: Assumption("torque not limited", _limited),
     WHEELS: Assumption("neither torque nor wheels limited, wheels without friction", _wheels_limited),
     FRICTIONLESS: Assumption("wheels without friction", _friction),
-    "bounded-momentum": Assumption("total momentum at most as told"),
+    "bounded-momentum": Assumption("total momentum at most as stated"),
     "spare-momentum": Assumption("no wheel filled by momentum that friction moves between wheels", _filled),
-    "best-plan": Assumption("torque of a plan as told, of nearly the least cost", _limited),
+    "best-plan": Assumption("torque of a plan as stated, of nearly the least cost", _limited),
     "no-wheels": Assumption("no stored momentum"),
     "no-outside-torque": Assumption("no torque from outside", _pulled),
     "known-outside-torque": Assumption("no torque from outside but what the law cancels", _uncancelled),
     "untold-torque": Assumption("a law that is given no torque from outside", _told),
     "bounded-outside-torque": Assumption("torque from outside bounded on each axis"),
-    "changing-outside-torque": Assumption("torque from outside told as at the attitude told, its rate bounded"),
+    "changing-outside-torque": Assumption("external torque known as at the measured attitude, its rate bounded"),
     "unknown-outside-torque": Assumption("torque from outside bounded in norm"),
-    "bounded-target": Assumption("target's motion at most as told"),
+    "bounded-target": Assumption("target's motion at most as stated"),
     VALID_ESTIMATE: Assumption("estimate valid throughout", _unsure),
     STEADY: Assumption("target between its jumps", _jumped),
     "target-at-rest": Assumption("target at rest", _turning),
@@ -241,8 +238,7 @@ class Standing:
     of the law's nominal model; true: "given" with the true one it was made for, "any", or "box" with those whose entries
     differ by at most `tolerance` sqrt(J_ii J_jj); limit: "given", "any" or "above", which is that limit or a larger one;
     momentum: whether with any angular momentum at the start; start: the level of V below which the start must be, None for
-    any start.
-    """
+    any start."""
 
     known: bool
     true: str

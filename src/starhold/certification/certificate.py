@@ -1,7 +1,6 @@
 """A certificate holds its loop, claims as numbers, and for each claim the obligations and their proofs. Sentences are made
 from the numbers when they are displayed (`wording`), so that nothing in the file can say more than the independent checker
-verifies.
-"""
+verifies."""
 
 from __future__ import annotations
 
@@ -59,8 +58,7 @@ class Proof:
 @dataclass(frozen=True, repr=False)
 class Claim:
     """`kind` names the claim, `numbers` quantify it, in SI units; None means unbounded. `witness`: numbers of the proof that
-    a checker needs. `proof`: the proof that the kernel has checked; without one nothing is decided.
-    """
+    a checker needs. `proof`: the proof that the kernel has checked; without one nothing is decided."""
 
     kind: str
     numbers: dict[str, Any]
@@ -110,8 +108,8 @@ class Claim:
 
 
 WITHOUT, ORBIT, UNTIL, LATE = "without:", "orbit-within:", "until:", "late:"
-"""Begin the identifiers of the assumptions that a part is not there, role and name, that forces move the orbit by no more
-than a share, and that a flight has not lasted longer (s)."""
+"""The prefixes of the identifiers of assumptions: that a part, role and name, is absent; that forces move the orbit by at
+most a share; that a flight has not lasted longer (s); and that the torque is at first no further from the command (N m)."""
 STEADY = "steady-target"
 """The assumption that the target does not jump."""
 BESIDE = ("sampling", "control-limit", "saturated-axis", "detumbling")
@@ -152,7 +150,7 @@ class Certificate:
 
     @property
     def no_larger_start(self) -> str:
-        """Why the claim about the loop as it flies is about no larger start; empty where the largest tried is in it."""
+        """Why the claim about the loop as it flies has no larger start set; empty where the largest one tried is in it."""
         return str(self.subject.get("no_larger_start", ""))
 
     @property

@@ -42,7 +42,7 @@ from starhold.parts.effectors.wheels import BAND, gives_allocated_torque
 BOUNDED = (POINTS, APPENDED)
 """The theorems about loops with pushes that are bounded."""
 ALMOST = Fraction(1, 10**9)
-"""A share by which the field along an orbit may be another one, for floats tell it."""
+"""The relative margin for the field along an orbit, which is computed in floats."""
 
 
 def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = None) -> list[str]:
@@ -74,7 +74,7 @@ def _of_detumbling(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         return
     if claim["taken"] != words:
         yield "only one of the two has wheels"
-    # Others than these are about the body's inertia, which the kernel compares.
+    # All other numbers are about the body's inertia, which the kernel compares.
     sides = {"dipole.limit": -1, "field.least": -1, "limit": -1} | dict.fromkeys(
         ("field.change", "outside", "outside.across", "stored"), 1
     )
@@ -114,13 +114,13 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if claim["theorem"] in BOUNDED:
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
-        # Without what grows as the body moves its parts are left out by name.
+        # Where a claim does not include what grows as the body moves, the parts are left out by name.
         known = replace(known, lags=not numbers.keys().isdisjoint(GROWING))
         pushed = known.against(envelope).numbers
         if "share" in numbers and (driven := driven_errors(loop)) is not None:
             pushed[DEVIATION] = driven.torque
         if not numbers.keys().isdisjoint(CHANGE):
-            # Without both a torque may turn over at once.
+            # Without both, a torque may reverse at once.
             numbers = dict.fromkeys(CHANGE, Fraction(0)) | numbers
             pushed |= dict(zip(CHANGE, change_of_modelled(loop, envelope), strict=True))
         yield from _late(numbers, late_torque(loop))
@@ -149,9 +149,9 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         yield "the limit is one of another kind"
     if wheeled:
         if loop.limit != "none" and isfinite(most["limit"]) and numbers.keys().isdisjoint(("limit", "limit.norm")):
-            yield "the limit is not told"
+            yield "the limit is not stated"
         yield from (
-            f"{name} is not told"
+            f"{name} is not stated"
             for name, x in most.items()
             if "." in name and name[0] in "ms" and isfinite(x) and name not in numbers
         )
@@ -182,7 +182,7 @@ def _planned(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if PLANNED not in claim["taken"]:
         yield "the law plans its moves"
     yield from (
-        f"{name} is not told" for name in recorded.subject if name.startswith("plan.") and name not in claim["subject"]
+        f"{name} is not stated" for name in recorded.subject if name.startswith("plan.") and name not in claim["subject"]
     )
     try:
         numbers, _ = told_of(recorded, plan)

@@ -25,9 +25,8 @@ Array = NDArray[np.float64]
 
 
 def field_along(loop: ClosedLoop, epoch: Date) -> tuple[float, float]:
-    """Return the least strength (T) of the field on a loop's orbit in a day from an epoch on, and by what share of itself it
-    changes per second from one control instant to the next at most, with a margin. ValueError for an orbit that is not
-    closed."""
+    """Return the least strength (T) of the field on a loop's orbit within a day from an epoch, and its largest relative
+    change per second from one control instant to the next, with a margin. ValueError for an orbit that is not closed."""
     times = np.arange(0.0, DAY, EVERY)
     first, second = (_field(loop, epoch, times + later) for later in (0.0, loop.period))
     size, after = (np.linalg.norm(B, axis=0) for B in (first, second))

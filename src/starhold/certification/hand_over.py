@@ -59,8 +59,8 @@ def flown_ends(
 
 
 def misjudged(loop: ClosedLoop, claim: Claim) -> float:
-    """Return by how much the rate of a loop's target (rad/s) is off at most as its law is told it: it is told where the
-    target turns in body axes, with the errors of the attitude in a claim."""
+    """Return the largest error of the target's rate (rad/s) that a law uses: it receives the target's rotation in body axes,
+    with the attitude errors of a claim."""
     off = (motion_of(loop) or AT_REST).off_rate
     return claim.numbers["attitude_error"] * above(make_subject(loop).target_rate) + off
 

@@ -36,19 +36,19 @@ def number(x: Any) -> float:
 
 
 def above(x: Any) -> float:
-    """A float not below a rational."""
+    """Return a float not below a rational."""
     exactly = fraction(x)
     value = float(exactly)
     return value if value >= exactly else float(np.nextafter(value, np.inf))
 
 
 def below(x: Any) -> float:
-    """A float not above a rational."""
+    """Return a float not above a rational."""
     return -above(-x)
 
 
 def upper(ball: arb) -> Any:
-    """A rational not below a ball."""
+    """Return a rational not below a ball."""
     return exact(above(exact(float(ball.abs_upper().mid())))) * exact(1.0 + 1e-15)
 
 

@@ -28,8 +28,8 @@ this may take; and about the share that is left after `ago`."""
 
 
 class Told(NamedTuple):
-    """How far off the attitude (rad) and the rate (rad/s) are at most: steadily, and in proportion to the body's rate and
-    acceleration. Each `ago` (s) what is more, after a faster motion, falls to a share `kept` of that."""
+    """Bounds of the errors of the measured attitude (rad) and rate (rad/s): steady ones, and in proportion to the body's
+    rate and acceleration. Every `ago` (s), what a faster motion added decays to a share `kept`."""
 
     attitude: float = 0.0
     rate: float = 0.0
@@ -69,8 +69,8 @@ class Driven(NamedTuple):
 
 
 def driven_errors(loop: ClosedLoop) -> Driven | None:
-    """Return what noise drives in a loop: errors of what its law is told, which are none where its parts do not say them,
-    and random torques from outside. None without either, and where the target depends on the law's mode."""
+    """Return the errors that noise drives in a loop: those of its law's inputs, zero where its parts do not declare them,
+    and random external torques. None without either, and where the target depends on the law's mode."""
     if loop.target.part.flag("BY_MODE"):
         return None
     result = measured(loop)
@@ -126,8 +126,8 @@ def measured(loop: ClosedLoop) -> Measured | None:
 
 
 def bounded(fitted: Fitted, period: float, estimated: bool = False) -> Errors | None:
-    """Read the declared largest errors of a part besides its noise, where they are finite; those of an attitude that is held
-    between updates too, where no estimator waits for them. None of these is one of a place."""
+    """Read the declared largest errors of a part besides its noise, where they are finite, with those of an attitude that is
+    held between updates, where no estimator waits for them. Errors of a position are not among them."""
     tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING and not tells_place(fitted) else None
     largest: Errors = NO_ERRORS if tell is None else tell(fitted.params)
     if tell is None or not all(map(isfinite, largest)):
@@ -158,7 +158,7 @@ def shown(sensor: Fitted) -> set[str]:
 
 
 def tells_place(fitted: Fitted) -> bool:
-    """Return whether a sensor or an estimator tells a position or velocity."""
+    """Return whether a sensor or an estimator gives a position or velocity."""
     module: Any = fitted.part.module
     return not PLACED.isdisjoint((module.Reading if fitted.part.role == "sensor" else module.Estimate)._fields)
 
@@ -175,7 +175,7 @@ def _estimated(lag: float, tell: Any, given: Any, noise: Noise, rates: list[Any]
     if gains is None:
         return None
     towards, later, steps, kept = gains
-    # Of attitude and rate: how much comes of each reading.
+    # The gains from each reading to the errors of attitude and rate.
     (attitude, turned, hurried), (rate, rated, late) = (
         [float(np.dot(one, sizes)) for sizes in zip(*steady, strict=True)] for one in towards
     )
@@ -186,9 +186,9 @@ def _estimated(lag: float, tell: Any, given: Any, noise: Noise, rates: list[Any]
 
 @cache
 def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list[float], int, float] | None:
-    """Return how large errors of attitude and rate become at most with errors of up to one of the gyro and of each attitude,
-    and with an acceleration of the body of one; after how many steps about a share of what is more is left, and what share.
-    None for an estimate that does not forget. noise: of deviations of one."""
+    """Return the largest errors of attitude and rate for unit errors of the gyro and of each attitude, and for a unit
+    acceleration of the body; the number of steps after which about a share of an additional error is left, and that share.
+    None for an estimate that does not forget. noise: of unit deviations."""
     recursion: Recursion = tell(given[0], noise, *given[1:])
     every, size = recursion.every, 3 * recursion.size
     steps = [*[_matrix(recursion.carried, recursion)] * (every - 1), _matrix(recursion.corrected, recursion)]
@@ -215,7 +215,7 @@ def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list
 
 
 def _sums(steps: list[Array], phase: int, count: int, size: int) -> Array:
-    """Return the sizes of the errors of attitude and rate at a step of a cycle that each reading makes, from 0 to so many
+    """Return the sizes of the errors of attitude and rate, at a step of a cycle, due to each reading from 0 to so many
     cycles of steps before: (2, readings, lags)."""
     every, readings = len(steps), steps[0].shape[1] // 3 - size // 3 - 1
     order = [steps[(phase + k) % every][:size, :size] for k in range(every)]

@@ -34,7 +34,7 @@ class Band(NamedTuple):
 
 
 def movers(loop: ClosedLoop) -> list[Fitted]:
-    """Return the parts that move the orbit besides the point mass, and tell by how much."""
+    """Return the parts that move the orbit besides the point mass, and declare by how much."""
     return [f for f in loop.used("environment") if f.part.hook("perturbation") is not None]
 
 

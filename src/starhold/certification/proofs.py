@@ -62,8 +62,7 @@ def proved_claims(
     and refuted ones among the others; and why no evidence was found for other theorems. turn: the rotation that the set
     within limits must contain (rad); rate: up to which motions should converge from every attitude (rad/s, inf for any);
     tolerance: of the inertia, by default the largest, in the pointing bound none; pointing: whether to find the pointing
-    bound of the loop as it flies, of motions that begin at the rate `begun` (rad/s).
-    """
+    bound of the loop as it flies, of motions that begin at the rate `begun` (rad/s)."""
     loop = find_claims(subject, turn, tolerance)
     if pointing and not subject.loop.remembers:
         _find_pointed(loop, None, begun, tolerance)

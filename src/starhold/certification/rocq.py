@@ -20,7 +20,7 @@ WORDS = {
     *("as", "at", "cofix", "else", "end", "exists", "fix", "for", "forall", "fun", "if", "in", "let", "match", "mod"),
     *("return", "then", "using", "where", "with", "R", "exceeds", "num", "shows", "vanishes"),
 }
-"""What no variable is called."""
+"""Words that no variable may be called."""
 
 
 class Part(NamedTuple):
@@ -54,7 +54,7 @@ Polynomial: TypeAlias = rules.Vanishes | rules.Squares | rules.Sum | rules.Contr
 
 
 def printed(proved: Sequence[Proved]) -> str:
-    """Return the text of a file that coqc accepts, with a lemma, or some, for each obligation that was checked."""
+    """Return the text of a file that coqc accepts, with one or more lemmas for each obligation that was checked."""
     Account.left = 10**12
     lines = list[str]()
     for i, one in enumerate(proved):
@@ -63,7 +63,7 @@ def printed(proved: Sequence[Proved]) -> str:
             lines.append(f"(* {_remark(name)} *)")
             evidence = one.claim.evidence.content.get(name)
             lines += (f"{text}\n" for text in _texts(obligation, evidence, f"claim{i}_{k}"))
-    # A place among variables is one word of the file's own, which is read sooner than a numeral.
+    # A place among variables is a word defined in the file, which is read faster than a numeral.
     count = max((int(x) + 1 for line in lines for x in re.findall(r"\bv(\d+) ", line)), default=0)
     rules = resources.files("starhold.certification").joinpath("rocq.v").read_text(encoding="utf-8")
     return "\n".join([rules, *(f"Definition v{k} := v {k}." for k in range(count)), "", *lines])
@@ -79,7 +79,7 @@ def _texts(o: rules.Obligation, evidence: Any, name: str) -> Iterator[str]:
 
 
 def lemmas(o: Polynomial, evidence: Any) -> Iterator[Lemma | Matrix]:
-    """Yield what an obligation says, with its evidence."""
+    """Yield the statements of an obligation, with its evidence."""
     if isinstance(o, rules.Vanishes):
         yield Lemma(o.p, None, _polys(evidence or []), o.modulo)
     elif isinstance(o, rules.Squares):
@@ -102,13 +102,14 @@ def lemmas(o: Polynomial, evidence: Any) -> Iterator[Lemma | Matrix]:
 
 
 def _form(a: Rows, p: Poly, cofactors: Sequence[Poly], zeros: Sequence[Poly]) -> Lemma:
-    """Return that p, which is x'ax but for zeros, exceeds a multiple of |x|^2."""
+    """Return the lemma that p, which is x'ax up to the zeros, exceeds a multiple of |x|^2."""
     x, (c, rest) = _vector("x", len(a)), _least(a, len(a))
     return Lemma(p, c * dot(x, x), cofactors, zeros, (), [Part([], x, rest)])
 
 
 def _contracting(o: rules.Contracts, P: Rows) -> Iterator[Lemma | Matrix]:
-    """Yield that P is positive definite, and that where y = Ax its form decreases, or is below rate^2 times that of x."""
+    """Yield the statements that P is positive definite, and that where y = Ax its form decreases, or is below rate^2 times
+    that of x."""
     x, y, PA = _vector("x", len(P)), _vector("y", len(P)), times(P, o.A)
     Ax, Px, Py = apply(o.A, x), apply(P, x), apply(P, y)
     zeros = [b - a for a, b in zip(Ax, y, strict=True)]
@@ -123,7 +124,7 @@ def _contracting(o: rules.Contracts, P: Rows) -> Iterator[Lemma | Matrix]:
 
 
 def _persisting(A: Rows, P: Rows) -> Iterator[Lemma]:
-    """Yield that where y = Ax the form y'Py is no less than x'Px, and that this is positive at some x."""
+    """Yield the statements that where y = Ax the form y'Py is at least x'Px, and that this is positive at some x."""
     x, y = _vector("x", len(P)), _vector("y", len(P))
     Ax, Px, Py = apply(A, x), apply(P, x), apply(P, y)
     turned = [a + b for a, b in zip(Py, apply(P, Ax), strict=True)]
@@ -164,7 +165,7 @@ def _vector(letter: str, count: int) -> list[Poly]:
 
 
 EASY = 6
-"""Rows of a matrix from which elimination takes long."""
+"""The number of rows from which on elimination takes long."""
 CHECKED = "vm_cast_no_check (eq_refl true)."
 """The end of a proof by computation, which Rocq does where the proof is accepted."""
 
@@ -175,7 +176,7 @@ def _proved(name: str, statement: str, *proof: str) -> str:
 
 
 def _definite(name: str, a: Rows) -> str:
-    """Return that a matrix times a number is positive definite, and its proof: of it less 1 on its diagonal."""
+    """Return the lemma that a matrix times a number is positive definite, and its proof: about it less 1 on its diagonal."""
     size, (c, _) = lcm(*(x.denominator for row in a for x in row)), _least(a, len(a))
     size *= ceil(1 / (c * size))
     size *= _room([[[size * x - (i == k) for k, x in enumerate(row)] for i, row in enumerate(a)]])
@@ -185,7 +186,7 @@ def _definite(name: str, a: Rows) -> str:
 
 
 def _text(name: str, given: Lemma) -> str:
-    """Return what a lemma says and its proof, in which every number is whole."""
+    """Return the statement of a lemma and its proof, in which every number is whole."""
     size, (p, low) = _whole(given.p, given.low or Poly({}))
     used = [(c, r) for c, r in zip(given.cofactors, given.zeros, strict=True) if c.terms]
     zeros, known = [_whole(r) for _, r in used], {k: _whole(given.known[k]) for part in given.parts for k in part.of}
@@ -267,13 +268,14 @@ def _number(x: Fraction | int) -> str:
 
 
 def _squares(gram: Rows) -> str:
-    """Write how squares leave little of a matrix."""
+    """Write the squares that leave little of a matrix."""
     size, error, taken = _taken(gram)
     return f"{size} {error} {_rows(taken)}"
 
 
 def _room(grams: Sequence[Rows]) -> int:
-    """Return by what matrices of whole numbers are multiplied so that short squares leave little of each, or 1."""
+    """Return the factor by which matrices of whole numbers are multiplied so that short squares leave little of each, or
+    1."""
     large = [gram for gram in grams if len(gram) > EASY]
     return next((c for c in (1, 2**40, 2**80) if all(_taken([[c * x for x in row] for row in a])[2] for a in large)), 1)
 
@@ -284,7 +286,7 @@ def _taken(gram: Rows) -> tuple[int, int, list[list[int]]]:
     G, count = [[int(x) for x in row] for row in gram], len(gram)
     bits = max((row[k].bit_length() for k, row in enumerate(G)), default=0)
     for s in (*range(bits - 40, 0, -20), 0):
-        # Entries of u are rounded, so that those of uu' are off by the largest at most.
+        # Entries of u are rounded, so entries of uu' are off by at most the largest.
         r = (s + bits) // 2 + 1
         taken = _factored([[x - (count * (i == k) << r) for k, x in enumerate(row)] for i, row in enumerate(G)], 2**s)
         if taken:

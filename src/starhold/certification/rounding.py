@@ -27,7 +27,7 @@ def speed(rate: float, up: bool = False) -> str:
 
 
 def growing(sizes: Sequence[float] | None) -> Iterator[str]:
-    """Word what errors of what the law is told are more as the body moves."""
+    """Word the growth of measurement errors as the body moves."""
     sizes = sizes or (0.0,) * 4
     for name, units, (turning, hurrying) in (("attitude", (" s", " s^2"), sizes[:2]), ("rate", ("", " s"), sizes[2:4])):
         kinds = zip((turning, hurrying), units, ("rate", "acceleration"), strict=True)

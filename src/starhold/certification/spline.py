@@ -87,10 +87,6 @@ class Intervals:
         roots = _outward(np.sqrt(np.maximum(self.low, 0.0)), np.sqrt(np.maximum(self.high, 0.0)))
         return Intervals(np.maximum(roots.low, 0.0), roots.high)
 
-    def clipped(self, low: float, high: float) -> Intervals:
-        """Return the intersection with low .. high, for numbers that are known to lie there."""
-        return Intervals(np.clip(self.low, low, high), np.clip(self.high, low, high))
-
 
 def _read(value: Any) -> Intervals:
     return value if isinstance(value, Intervals) else Intervals(value)
@@ -116,13 +112,13 @@ def _hull(operation: Callable[[Any, Any], Any], a: Intervals, low: Array, high: 
 
 BITS = 192
 POINTS = 17
-"""At which peaks are guessed on each stretch."""
+"""The number of points on each stretch at which peaks are guessed."""
 MOST = 4_000_000
 """The most parts of stretches in one proof."""
 MARGINS = (1.01, 1.1, 2.0, 10.0)
 BESIDE = 1e-3
-"""The bound of the acceleration has this much room beside a share of the peak, in squares of the rate: an even turn has
-no acceleration at all."""
+"""The bound of the acceleration has this much room in addition to a share of the peak, in squares of the rate: a uniform
+rotation has no acceleration at all."""
 
 
 def spline_bounds(knots: Knots) -> tuple[Any, Any]:
@@ -195,7 +191,7 @@ def _within(cubic: Any, lengths: Intervals, rate: float, acceleration: float) ->
     limits = [(rate * lengths).square(), (acceleration * lengths.square()).square()]
     lane: NDArray[np.intp] = np.arange(len(lengths.low), dtype=np.intp)
     low, high = np.zeros(len(lane)), np.ones(len(lane))
-    # So many that what is left out is below the rounding.
+    # So many that the remainder is below the rounding.
     terms = int(8.0 + 2.0 * np.sum([np.abs(x.high) for v in cubic for x in v], axis=0).max())
     looked = 0
     while len(lane):
@@ -204,7 +200,7 @@ def _within(cubic: Any, lengths: Intervals, rate: float, acceleration: float) ->
             return False
         middle = 0.5 * (low + high)
         a, b, c = (tuple(Intervals(x.low[lane], x.high[lane]) for x in v) for v in cubic)
-        # About the middle, where the powers of what is left are smallest.
+        # About the middle, where the powers of the remaining part are smallest.
         m, r = Intervals(middle), Intervals(low - middle, high - middle)
         square = r.square()
         phi, slope, bend = list[Any](), list[Any](), list[Any]()
@@ -241,8 +237,8 @@ def _motion(phi: Any, slope: Any, bend: Any, tail: Any, terms: int) -> tuple[Any
 
 
 def _series(x: Any, j: int, tail: Any, terms: int, derived: bool = False) -> Any:
-    """2 k1 (j = 1) or 6 k2 (j = 2), or -24 or -120 times its derivative by x, as 1 - r_1 x (1 - r_2 x (...)). What is left
-    out is between 0 and 1, for the terms alternate and shrink from there on where (2 terms + 2)^2 exceeds x."""
+    """2 k1 (j = 1) or 6 k2 (j = 2), or -24 or -120 times its derivative by x, as 1 - r_1 x (1 - r_2 x (...)). The remainder
+    is between 0 and 1, for the terms alternate and shrink from there on where (2 terms + 2)^2 exceeds x."""
     for n in range(terms, 0, -1):
         above, below = (n + 1, n * (2 * n + j + 2) * (2 * n + j + 3)) if derived else (1, (2 * n + j) * (2 * n + j + 1))
         tail = 1.0 - x * float(above) / float(below) * tail

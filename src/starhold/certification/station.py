@@ -66,7 +66,7 @@ def _rest(station: Station) -> list[Claim | None]:
 
 
 def _tried(show: Callable[[], None]) -> str:
-    """Return why nothing was found; empty where something was."""
+    """Return why no evidence was found; empty where some was."""
     try:
         show()
     except UNSHOWN as reason:
@@ -86,7 +86,7 @@ def _undecided(loop: ClosedLoop, kind: str, obligation: str, why: str, details: 
 
 
 def _mismatch(loop: ClosedLoop) -> str:
-    """Return the mismatch of a law that cancels another model than the one that flies; empty where it cancels that."""
+    """Return how the model that a law cancels differs from the one that flies; empty where it does not."""
     undoes = bool(getattr(loop.gains, "model", full_problem(loop)))
     if undoes == full_problem(loop):
         return ""

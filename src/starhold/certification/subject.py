@@ -50,9 +50,10 @@ class Subject:
     modelled: bound on each axis of the torque the models know (N m); target_rate, target_acceleration: bounds on the
     target's motion (rad/s, rad/s2), zero for one at rest; disturbance: bound on the norm of any further torque (N m);
     total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels;
-    tolerance: in the pointing claim the inertia's entries are off by this share of sqrt(J_ii J_kk) at most, None where the
-    inertia is as given; pull: bound of the torque that an inertia of one has by the gravity gradient (1/s2); lags: whether
-    the pointing claim is about what is late too: the torque, and what the law is told as the body moves."""
+    tolerance: in the pointing claim the inertia's entries differ by at most this share of sqrt(J_ii J_kk), None where the
+    inertia is as given; pull: bound of the gravity-gradient torque per unit of inertia (1/s2); lags: whether the pointing
+    claim includes lag, of the torque and of measurements as the body moves.
+    """
 
     loop: ClosedLoop
     disturbance: Any
@@ -67,16 +68,17 @@ class Subject:
 
     @property
     def off(self) -> float:
-        """A bound of the norm of what the inertia is off by (kg m2)."""
+        """A bound of the norm of the inertia's error (kg m2)."""
         return (self.tolerance or 0.0) * float(np.trace(tensor(self.loop.craft.inertia))) * (1.0 + 1e-12)
 
     def envelope(self, noisy: bool) -> Envelope:
-        """Return the envelope of its motions, for the bounds of parts; noisy: except for a share of times."""
+        """Return the envelope of its motions, for the bounds of parts; noisy: except for a share of the time."""
         given = envelope_of(self.loop, above(self.total_momentum), noisy)
         return given._replace(moment=given.moment + self.off)
 
     def against(self, envelope: Envelope) -> Pushes:
-        """Return bounds of what acts on the loop and is told to no law, the pull on what the inertia is off by included."""
+        """Return bounds of the disturbances that the law does not know, including the gravity-gradient torque on the
+        inertia's error."""
         bounds = pushes(self.loop, envelope)
         bounds = bounds if self.lags else bounds.steady
         return bounds._replace(outside=bounds.outside + float(self.disturbance) + above(self.pull) * self.off)
@@ -101,8 +103,8 @@ def make_subject(
     loop: ClosedLoop, disturbance: float = 0.0, momentum: float | None = None, stored: float = np.inf
 ) -> Subject:
     """The subject of a closed loop, with bounds over the whole orbit. `momentum`: in claims about wheels the total angular
-    momentum (N m s); if absent what the loop starts with, or what it has at rest on target if that is more, but with no more
-    than `stored` in the wheels."""
+    momentum (N m s); by default that of the start, or that at rest on target if it is larger, with at most `stored` in the
+    wheels."""
     rate, acceleration = _target_bounds(loop)
     axes, norm, pull = (fmpq(0), fmpq(0), fmpq(0)), fmpq(0), fmpq(0)
     if loop.has("gravity-gradient"):
@@ -118,8 +120,8 @@ def make_subject(
 
 
 def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
-    """The subject as plain numbers and names, all that a checker needs to build it again; what no claim of these kinds is
-    about is left out."""
+    """The subject as plain numbers and names, all that a checker needs to build it again, without what no claim of these
+    kinds is about."""
     loop = subject.loop
     limit = loop.craft.torque_limit
     orbit = {
@@ -155,8 +157,8 @@ def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
 
 
 def described_target(loop: ClosedLoop) -> dict[str, Any]:
-    """The target by its name, with its attitude if it rests and the knots that it follows if it has any; one that claims
-    leave out as they name it."""
+    """The target by its name, with its attitude if it rests and its knots if it has any; a target that claims leave out is
+    described by the name that they use."""
     part, knots = loop.target.part, followed(loop)
     name = part.name if is_read(loop, loop.target) else f"{part.role} {loop.target.called}"
     history = None if knots is None else {"interpolant": SPLINE} | {n: x.tolist() for n, x in knots._asdict().items()}
@@ -165,7 +167,7 @@ def described_target(loop: ClosedLoop) -> dict[str, Any]:
 
 
 def followed(loop: ClosedLoop) -> Knots | None:
-    """The knots of the spline that a tabulated target follows; of a table that comes without, its rows are the knots."""
+    """The knots of the spline that a tabulated target follows; the rows of a table without knots are its knots."""
     if loop.target.part.name != "history":
         return None
     table, knots = loop.target.params
@@ -226,10 +228,10 @@ def _momentum(loop: ClosedLoop, target_rate: Any, stored: float) -> float:
 
 
 def gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any, Any]:
-    """Bounds on the axes and on the norm of the gravity-gradient torque over the whole orbit (N m), and on the norm for an
-    inertia of one (1/s2)."""
+    """Bounds on the axes and on the norm of the gravity-gradient torque over the whole orbit (N m), and on the norm per unit
+    of inertia (1/s2)."""
     nearest, _, _, gravity = perigee(loop)
-    # A part more, for the inertia with the rotors is what is flown up to rounding.
+    # With a margin, because the inertia with the rotors is flown up to rounding.
     strength = upper(3 * gravity / (nearest * (1 - exact(band_of(loop).share))) ** 3) * exact(1.0 + 1e-12)
     full = _with_rotors(loop)
     whole = Craft(as_tuple(full), as_tuple(full), Polynomial.constant(0), Polynomial.constant(0))  # pyright: ignore

@@ -1,4 +1,4 @@
-"""How a loop's target moves at most, as its part tells on the orbit of the loop."""
+"""Bounds of the motion of a loop's target, as its part declares them on the orbit of the loop."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import Motion, Orbit
 
 NOWHERE = Orbit(0.0, inf, inf, inf, 0.0, ZERO)
-"""The orbit that a target is given which does not depend on one."""
+"""The orbit given to a target that does not depend on one."""
 
 
 def motion_of(loop: ClosedLoop) -> Motion | None:
-    """Return the bounds of the target's motion; None for one that tells none, or that has none."""
+    """Return the bounds of the target's motion; None for a target that declares none, or that has none."""
     tell = loop.target.part.hook("motion")
     if tell is None:
         return None

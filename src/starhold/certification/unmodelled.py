@@ -55,7 +55,7 @@ GROWING = (
     "error.ago",
     "error.kept",
 )
-"""The numbers of a claim about errors of what the law is told that grow as the body moves."""
+"""The numbers of a claim about measurement errors that grow as the body moves."""
 SETTLED = ("linear-estimate", "settled-estimate")
 """Assumptions of claims about an estimate."""
 MORE, LARGER = 1.0 + 1e-12, 1.0 + 1e-6
@@ -63,10 +63,9 @@ MORE, LARGER = 1.0 + 1e-12, 1.0 + 1e-6
 
 
 class Pushes(NamedTuple):
-    """Bounds of what acts on a loop and is told to no law: the torque from outside (N m, and N m s times the body's rate),
-    errors of the attitude (rad) and the rate (rad/s) that the law is told, of the command (as the torque), and of the
-    target's rate (rad/s) and acceleration (rad/s2); and what errors that the law is told are more as the body moves, as of
-    `Told`."""
+    """Bounds of the disturbances on a loop that its law does not know: the external torque (N m, and N m s times the body's
+    rate), errors of the measured attitude (rad) and rate (rad/s), of the command (as the torque), and of the target's rate
+    (rad/s) and acceleration (rad/s2); and the growth of measurement errors as the body moves, as in `Told`."""
 
     outside: float
     outside_per_rate: float = 0.0
@@ -80,21 +79,21 @@ class Pushes(NamedTuple):
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The numbers of a claim that they are."""
+        """The numbers of a claim that state these bounds."""
         names = ("outside", "outside.per.rate", "error.attitude", "error.rate", "error", "error.per.rate")
         names = (*names, "error.target.rate", "error.target.acceleration", *GROWING)
         return dict(zip(names, (*self[:-1], *self.more), strict=True))
 
     @property
     def steady(self) -> Pushes:
-        """Without what grows as the body moves."""
+        """The bounds without what grows as the body moves."""
         return self._replace(more=Pushes(0.0).more)
 
 
 def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
-    """Tell what the motions of a loop do not leave while its momentum (N m s) is no more than told, its orbit stays in its
-    band, and no part that is left out by name moves it. A little more, for floats tell how low the orbit comes. noisy: but
-    for a share of times."""
+    """Return a set that the motions of a loop do not leave while its momentum (N m s) is within a bound, its orbit stays in
+    its band, and no part that is left out by name moves it; with a margin, because the lowest point of the orbit is computed
+    in floats. noisy: except for a share of the time."""
     start, share = loop.start, band_of(loop).share
     low, _, fast = extremes(loop) if loop.has("two-body") else (norm(start.position), inf, norm(start.velocity))
     moment = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[-1])
@@ -120,7 +119,7 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
 
 
 def _told(loop: ClosedLoop) -> list[tuple[tuple[Fitted, ...], Told]]:
-    """Return the errors of what a law is told besides noise, with the parts that they come from."""
+    """Return the measurement errors besides noise, with the parts that they come from."""
     result = measured(loop)
     together = () if result is None else result.parts
     amiss = [] if result is None else [(together, result.amiss)]
@@ -132,13 +131,13 @@ def _told(loop: ClosedLoop) -> list[tuple[tuple[Fitted, ...], Told]]:
 
 
 def grows(loop: ClosedLoop) -> bool:
-    """Whether errors of what a law is told grow as the body moves."""
+    """Whether measurement errors grow as the body moves."""
     return any(amiss.grows for _, amiss in _told(loop))
 
 
 def late_torque(loop: ClosedLoop) -> Late | None:
-    """Return how late the torque is, exactly and as flights follow a lag in their steps, with a margin for rounding; None
-    where no actuator tells, or more than one is late."""
+    """Return how late the torque is, exactly and as flights integrate a lag, with a margin for rounding; None where no
+    actuator declares it, or more than one lags."""
     actuators = _moving(loop)
     tell: Any = actuators[0].part.hook("late") if len(actuators) == 1 else None
     if tell is None:
@@ -154,8 +153,9 @@ def late_torque(loop: ClosedLoop) -> Late | None:
 
 
 def _in_steps(fastest: float, loop: ClosedLoop) -> tuple[float, ...]:
-    """Return what flights make of a lag in the steps of the fourth-order method: what is late in the end of a period, in its
-    mean, and in that by the time that is left, as shares of what it is first; nothing without a rate at which it settles."""
+    """Return the effect of integrating a lag in steps of the fourth-order method: the share of an initial error that is left
+    at the end of a period, in its mean, and in the mean weighted by the remaining time; empty without a rate at which it
+    settles."""
     step, kept, mean, moment = 1.0 / loop.substeps, 1.0, 0.0, 0.0
     x = fastest * loop.period * step
     for _ in range(loop.substeps):
@@ -171,7 +171,7 @@ def _moving(loop: ClosedLoop) -> list[Fitted]:
 
 
 def environment_torques(loop: ClosedLoop, envelope: Envelope) -> tuple[Push, float]:
-    """Add up the declared bounds of the environments' torques that no law is told: of those in any direction, and of those
+    """Add up the declared bounds of the environments' torques that laws do not know: of those in any direction, and of those
     at right angles to the magnetic field (N m)."""
     torques = [(f, push) for f in loop.used("environment") if (push := _pushes(f, envelope)[0]) is not None]
     across = [push.torque for f, push in torques if f.part.flag("ACROSS_FIELD")]
@@ -180,8 +180,8 @@ def environment_torques(loop: ClosedLoop, envelope: Envelope) -> tuple[Push, flo
 
 
 def change_of_modelled(loop: ClosedLoop, envelope: Envelope) -> Push:
-    """Add up how fast the torques change at most that laws are told as they are at the attitude that these are told: `inf`
-    for a part that does not say, or if a position is told that could be off."""
+    """Add up the largest rates of change of the torques that laws know at their measured attitude: `inf` for a part that
+    does not declare it, or if a measured position could be in error."""
     parts = [f for f in loop.used("environment") if f.part.flag("MODELLED")]
     tells: list[Any] = [f.part.hook("torque_change") for f in parts]
     telling = (*loop.used("sensor"), *loop.used("estimator"))
@@ -195,7 +195,7 @@ def samples_of(loop: ClosedLoop) -> int:
     """Return the control steps of an orbit, or of an hour where there is none."""
     start = loop.start
     orbit = period_of(start.position, start.velocity, loop.craft.gravity) if loop.has("two-body") else SPAN
-    # A little more, for floats tell the period; it goes with the power 3/2 of the distance.
+    # With a margin, because the period is computed in floats; it grows with the power 3/2 of the distance.
     return ceil((orbit if isfinite(orbit) else SPAN) / loop.period * (1.0 + 1e-9) * (1.0 + 3.0 * band_of(loop).share))
 
 
@@ -219,7 +219,7 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         moved = appendages(loop) if claim.kind == "appendages" else ()
         there = (*noisy, *moved, *(_moving(loop) if claim.numbers.get("late_torque") else ()))
         grown = "told_growth" in claim.numbers
-        # What grows is in the claim or the parts are not, nor is what noise drives of them.
+        # Parts whose errors grow are left out unless the claim includes the growth, and noisy ones unless it includes noise.
         left = [f for parts, one in amiss if one.grows and not grown for f in parts]
         left += [] if driven is None or noisy else driven.parts
         telling = [f for parts, _ in amiss for f in parts if f not in left]
@@ -246,7 +246,7 @@ def _acting(loop: ClosedLoop) -> tuple[Fitted, ...]:
     parts = loop.as_commanded().parts
     watched = {name for f in loop.parts if f not in parts for name in f.needs}
     read = {*loop.law.reads, *(name for f in parts for name in (*f.part.reads, *f.needs))}
-    # Without an estimator what sensors tell of the state takes its place.
+    # Without an estimator, the sensors' readings of the state take its place.
     read |= set() if loop.used("estimator") else {*loop.start._fields}
     return tuple(f for f in parts if f.part.role != "sensor" or shown(f) & read or not shown(f) & watched)
 
@@ -268,7 +268,7 @@ def _is_modelled(part: Part) -> bool:
 
 
 def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
-    """Whether all that a part does to a loop beside what the law is told has a bound."""
+    """Whether everything that a part does to a loop, besides what the law measures, has a bound."""
     part, banded = fitted.part, fitted in movers(loop) and bool(band_of(loop).share)
     if moves(fitted.params) or (_always_moves(fitted) and not banded):
         # No claim follows an orbit that such a force changes.
@@ -277,8 +277,8 @@ def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
         return True
     torque, error = (push is not None for push in _pushes(fitted, envelope))
     if part.role == "effector":
-        # Beside the command an effector reacts as its momentum turns with the body. No bound is one of its inertia, or of
-        # what a law makes of its momentum.
+        # Besides its command, an effector reacts as its momentum turns with the body. No bound covers its inertia, or the
+        # use that a law makes of its momentum.
         sized = torque and part.hook("inertia") is None
         return sized and (not part.flag("ACTS") or (error and not tells_momentum(loop, fitted)))
     return _is_idle(loop, fitted, envelope) or torque or error
@@ -290,8 +290,8 @@ def _always_moves(fitted: Fitted) -> bool:
 
 
 def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool:
-    """Whether a claim about detumbling includes a part: what it is about, environments with a bound, and all that the law
-    does not look at."""
+    """Whether a claim about detumbling includes a part: what it is about, environments with a bound, and everything that the
+    law does not read."""
     part = fitted.part
     if part.role == "sensor" and "magnetic_field" in shown(fitted):
         return bounded(fitted, period) == NO_ERRORS and not is_random(noise_of(fitted, period))
@@ -303,11 +303,10 @@ def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool
 
 def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | None]:
     """Read the declared bounds of a part's torque and of its error of the command; for a part that could be left out only
-    finite ones.
-    """
+    finite ones."""
     part = fitted.part
     acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
-    # A torque that laws are told is bounded by the claim's numbers, which are about the gravity gradient alone.
+    # The claim's numbers bound the torques that laws know, and are about the gravity gradient alone.
     acts = acts and (_is_modelled(part) or not part.flag("MODELLED"))
     tells: list[Any] = [part.hook("bound") if acts else None, part.hook("error") if part.role in COMMANDED else None]
     declared = [None if tell is None else tell(fitted.params, envelope) for tell in tells]

@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -170,10 +170,6 @@ def _followed(subject: Mapping[str, Any]) -> str:
     return ", while the target follows the rotation spline through its history" if followed else ""
 
 
-def _convergence(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    return f"{place(n, subject)} the body comes to rest on target{_cover(n, subject)}".strip()
-
-
 def _hand_over(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     def most(value: float, unit: str) -> str:
         # Without the rounding of the law's own comparison.
@@ -272,13 +268,13 @@ def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 def _detumbling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "rates" not in n:
-        return "the energy falls where the magnetic field turns in the body"
+        return "the energy decreases where the magnetic field turns in the body"
 
-    # Rates between, by how much the energy rises and for how long the field turns fast are in the certificate.
+    # Rates between, by how much the energy increases and for how long the field turns fast are in the certificate.
     ends = sorted({0, len(n["rates"]) - 1})
     falls = [f"{speed(n['turning'][k], True)} up to {speed(n['rates'][k])}" for k in ends]
     return (
-        f"energy falls in each control period in which the field turns in the body by over {', '.join(falls)}; field ≥"
+        f"energy decreases in each control period in which the field turns in the body by over {', '.join(falls)}; field ≥"
         f" {shown(n['field'], ' T', True)}, changing ≤ {shown(100.0 * n['field_change'], ' %')}/s; torques ≤"
         f" {shown(n['torque'], ' N m')}, across it {shown(n['torque_across'], ' N m')}"
     )
@@ -292,18 +288,10 @@ def _circles(n: Mapping[str, Any]) -> str:
     return f"from the level set of V that holds {band} and, {off},"
 
 
-def _circle(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    return f"{_circles(n)} the motion ends on the circle".strip()
-
-
 def _control_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     kind = "on every axis" if n["kind"] == "axis" else "in norm"
     limit = shown(n["limit"], " (scaled)", up=not n["refuted"])
     return f"{_circles(n)} with x = 0, the control never exceeds {limit} {kind}".strip()
-
-
-def _equilibrium(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    return "from everywhere the motion comes to rest where it is wanted"
 
 
 def _saturated_axis(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -317,8 +305,8 @@ def _saturated_axis(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     )
 
 
-_SENTENCES = {
-    "convergence": _convergence,
+_SENTENCES: Mapping[str, Callable[[Mapping[str, Any], Mapping[str, Any]], str]] = {
+    "convergence": lambda n, subject: f"{place(n, subject)} the body comes to rest on target{_cover(n, subject)}".strip(),
     "hand-over": _hand_over,
     "region": _region,
     "torque-limit": _torque_limit,
@@ -328,9 +316,9 @@ _SENTENCES = {
     "sampling": _sampling,
     "sliding": _sliding,
     "detumbling": _detumbling,
-    "circle": _circle,
+    "circle": lambda n, subject: f"{_circles(n)} the motion ends on the circle".strip(),
     "control-limit": _control_limit,
-    "equilibrium": _equilibrium,
+    "equilibrium": lambda n, subject: "from everywhere the motion comes to rest where it is wanted",
     "saturated-axis": _saturated_axis,
 }
 

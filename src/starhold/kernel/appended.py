@@ -1,9 +1,8 @@
 """A loop with its torque held between samples, and a body with appendages whose motion is a recorded program.
 
-The state z = (w, q, v) has that of the appendages, v. Near rest z' = Az + B(u + d) and what is left, of which models of the
-program bound how large it is, and u = -K(w, q) and what is left likewise. Samples are in modal coordinates, y = Wz, in
-blocks of one or two: each |y_k| <= r_k. All bounds of what a period makes of that are linear in r, and a constant.
-Docs/kernel.md, 12.
+The state z = (w, q, v) contains the appendages' state v. Near rest z' = Az + B(u + d) plus a remainder, which Taylor models
+of the program bound, and u = -Kz plus a remainder, bounded likewise. Samples are in modal coordinates, y = Wz, in blocks of
+one or two, each with a bound |y_k| <= r_k. All bounds over a period are linear in r, plus a constant. Docs/kernel.md, 12.
 """
 
 from __future__ import annotations
@@ -22,15 +21,15 @@ from .taylor import PLACES, Model, add, beyond, multiple, multiply, negative, nu
 from .taylor import root as root_of
 
 MOST, LONGEST, FINE, TINY, LITTLE, SHORT = 40, 16, 2**64, Fraction(1, 2**20), Fraction(1, 2**200), 48
-"""How many states appendages may have; how far the motion of a period may be; the share of it at which a series ends; the
-size of inputs of which slopes at zero are read; the least number of a matrix of bounds that is not zero; the places of
+"""The most states of appendages; the largest norm of A times the period; the relative size of terms at which a series ends;
+the size of inputs at which slopes at zero are read; the least nonzero entry of a matrix of bounds; the binary places of
 slopes."""
 HALF, ZERO = Fraction(1, 2), Fraction(0)
 Column = list[Fraction]
 
 
 class Box(NamedTuple):
-    """A box bounds the states between samples, the torque, and the state at samples that the law is told."""
+    """Bounds of the states between samples, of the torque, and of the measured state at samples."""
 
     state: Column
     torque: Column
@@ -38,7 +37,8 @@ class Box(NamedTuple):
 
 
 class Left(NamedTuple):
-    """The rates, and the law's torque, differ from the linear ones by at most D|z| + T|u + d| + c, and D|z| + c."""
+    """Remainders: the rates differ from the linear ones by at most D|z| + T|u + d| + c, the law's torque by at most D|z| +
+    c."""
 
     state: Rows
     torque: Rows
@@ -48,10 +48,10 @@ class Left(NamedTuple):
 
 
 class Period(NamedTuple):
-    """Samples with |y_k| <= r_k are followed by ones with |y| <= grown r + more, the states until then are at
-    most between r + far, torques with all errors torque r + pushed, and the command torque r + commanded, of which
-    law r + law_rest is what is not linear in what is told. Rates differ from the linear ones by `over` at most; torques from
-    outside are no more than `outside`, and errors of the command and of what is told no more than `error`."""
+    """Samples with |y_k| <= r_k are followed by ones with |y| <= grown r + more. Until then states are at most between r +
+    far, torques with all errors torque r + pushed, and the command torque r + commanded, of which law r + law_rest is
+    nonlinear in the measured state. Rates differ from the linear ones by at most `over`; external torques are at most
+    `outside`, and errors of the command and of the measurement, as torques, at most `error`."""
 
     grown: Rows
     more: Column
@@ -68,7 +68,7 @@ class Period(NamedTuple):
 
 
 class Appended:
-    """The loop, its programs read near rest, and the bounds of a period."""
+    """The loop, its programs linearised near rest, and the bounds of a period."""
 
     def __init__(self, loop: AttitudeLoop) -> None:
         claim = loop.claim
@@ -89,13 +89,14 @@ class Appended:
         self.K = shortened([[-slope(x, TINY, k) for k in range(self.n)] for x in self.command(small)], SHORT)
 
     def rates(self, state: Column, torque: Column) -> list[Model]:
-        """Return models of w' and v' where states and torques are no larger than told."""
+        """Return Taylor models of w' and v' for states and torques up to these sizes."""
         given = {name: within(state[k], k) for name, k in self.names.items()}
         given |= {f"torque.{k}": within(torque[k], self.n + k) for k in AXES}
         return run(self.motion, given, 3 + self.count)
 
     def command(self, state: Column) -> list[Model]:
-        """Return models of the law's torque where it is told no larger a state, near a target at rest, and no torque."""
+        """Return Taylor models of the law's torque for measured states up to these sizes, near a target at rest, without
+        external torque."""
         w, q = ([within(state[k], k) for k in range(first, first + 3)] for first in (0, 3))
         scalar_part = number(Fraction(1))
         for x in q:
@@ -111,7 +112,7 @@ class Appended:
         return run(program, given, 3)
 
     def left(self, box: Box) -> Left:
-        """Return what is left on a box. Of a turn that is q0 w - w + q x w, half of it."""
+        """Return the remainders on a box. For q' the remainder is half of q0 w - w + q x w."""
         sizes = [*box.state, *box.torque]
         linear = [[*a, *b] for a, b in zip(self.A, self.B, strict=True)]
         rows = [beyond(x, sizes, row) for x, row in zip(self.rates(*box[:2]), [*linear[:3], *linear[6:]], strict=True)]
@@ -131,29 +132,29 @@ class Appended:
 
     @cached_property
     def misread(self) -> Column:
-        """Return how far the state that the law is told is from the true one."""
+        """Return the bounds of the measurement errors of the state."""
         turned, rate = (self.numbers.get(f"error.{name}") or ZERO for name in ("attitude", "rate"))
-        demand(turned <= HALF, "an attitude is told too wrongly")
+        demand(turned <= HALF, "the error of the measured attitude is too large")
         return [*[rate] * 3, *[turned / 2] * 3, *[ZERO] * self.count]
 
     def push(self, name: str, state: Column) -> Fraction:
-        """Return a bound of the torque from outside, or of the error of the command."""
+        """Return a bound of the external torque, or of the command's error."""
         return self.numbers[name] + (self.numbers.get(f"{name}.per.rate") or ZERO) * norm(state[:3])
 
     def take(self, W: Rows, blocks: Sequence[int]) -> None:
-        """Take modal coordinates, in blocks of so many, and compute the linear motion in them."""
+        """Take modal coordinates, in blocks of these sizes, and compute the linear motion in them."""
         self.W, self.blocks = W, blocks
         demand(set(blocks) <= {1, 2} and sum(blocks) == self.n, "blocks of coordinates are not of one or two")
         h, A, alone, axes = self.h, self.A, [1] * self.n, [1] * 3
         V = times(inverse(times(transpose(W), W)), transpose(W))
         KV = times(self.K, V)
-        # Components of (Ah)^m x are no larger than a^m where those of x are no larger than 1.
+        # If no component of x exceeds 1, no component of (Ah)^m x exceeds a^m.
         a = h * max(map(total, A))
         demand(a <= LONGEST, "the period is too long for the appendages")
         terms, last, top = 0, a / 2, 3 ** -(-a.numerator // a.denominator)
         while last * top * FINE > 1:
             terms, last = terms + 1, last * a / (terms + 3)
-        # Of the terms (Ah)^m/m! each entry is rounded down, which takes none further off than by this times e^a.
+        # Each entry of the terms (Ah)^m/m! is rounded down, which moves none of them by more than this times e^a.
         places = PLACES + top.bit_length()
         self.tail = up(h * top * (last + Fraction(self.n * (terms + 1), 1 << places)))
         self.pull = plus(A, times(self.B, self.K), -1)[:3]
@@ -168,17 +169,18 @@ class Appended:
             spans, given = plus(spans, sized(moved, alone, blocks), share), plus(given, sizes_of(pushed), share)
             carry = plus(carry, sizes_of(power), share)
             filtered = plus(filtered, sized(times(W, power), blocks, alone), share)
-            # Torques from outside come from any side, and turn over at any time.
+            # External torques have any direction, and may reverse at any time.
             lengths, turned = list(map(norm, pushed)), parted(times(W, pushed), blocks)
             nudged = [x + share * y for x, y in zip(nudged, lengths, strict=True)]
-            # A curve is h^2/8 of its second derivative from a line, which is near that in the middle of the period.
+            # A curve is h^2/8 of its second derivative away from its chord, and that is near its value in the middle of the
+            # period.
             curve, in_middle = h * (m * (m - 1)) / 12, Fraction(4, 2**m)
             bent = [x + curve * (1 - in_middle) * y for x, y in zip(bent, lengths, strict=True)]
             middle = plus(middle, pushed, curve * in_middle)
             struck = [x + share * norm(y for row in rows for y in row) for x, rows in zip(struck, turned, strict=True)]
             hurry = plus(hurry, sized(times(A[:3], moved), axes, blocks), share)
             power = shortened([[share * x for x in row] for row in times(A, power)], places)
-        # A block of two is no longer than 3/2 times the larger one of its components.
+        # A block of two is at most 3/2 times as long as its larger component.
         largest = [max(map(total, rows)) for rows in parted(W, blocks)]
         self.widths = [up(x * (size + 1) / 2) for x, size in zip(largest, blocks, strict=True)]
         self.filter = short([[x + self.tail * width for x in row] for row, width in zip(filtered, self.widths, strict=True)])
@@ -196,7 +198,7 @@ class Appended:
         self.sampled = shortened(times(end, W), PLACES)
 
     def begun(self, X: Rows, appendages: Column) -> Column:
-        """Return bounds of the blocks where (w, q) is in the ellipsoid of X, and appendages are no further than told."""
+        """Return bounds of the blocks for (w, q) in the ellipsoid of X and for appendages within these bounds."""
         blocks = list[Fraction]()
         for rows in parted(self.W, self.blocks):
             first = [row[:6] for row in rows]
@@ -206,17 +208,18 @@ class Appended:
         return blocks
 
     def period(self, box: Box) -> Period:
-        """Return what a period makes of samples, as long as states and torques are within a box."""
-        # So the scalar part of what is told is positive, too.
+        """Return the bounds of a period that follow from those of samples, as long as states and torques stay within a
+        box."""
+        # So the scalar part of the measured quaternion is positive, too.
         demand(norm(box.measured[3:6]) <= HALF, "motions are not near the target")
         left = self.left(box)
         error, outside = (self.push(name, box.state) for name in ("error", "outside"))
-        # The law's torque is -Kz, and beside no more than law r + rest, as it is told a state that is off.
+        # The law's torque is -Kz plus at most law r + rest, because the measured state is in error.
         law, law_rest = times(left.law, self.start), combined(left.law_rest, image(left.law, self.misread))
         commanded = combined(law_rest, image(sizes_of(self.K), self.misread))
         rest = combined(commanded, [error] * 3)
         torque, pushed = short(plus(self.feedback, law)), combined(rest, [outside] * 3)
-        # What moves the state beside the linear motion and torques from outside from the sample on.
+        # What drives the state besides the linear motion and the external torques, from the sample on.
         over = combined(left.rest, image(left.state, box.state), image(left.torque, box.torque))
         tail = self.unseries(box)
         between = short(plus(self.spans, times(self.given, law)))
@@ -232,18 +235,18 @@ class Appended:
         return Period(grown, more, between, far, torque, pushed, commanded, law, law_rest, over, outside, error)
 
     def unseries(self, box: Box) -> Fraction:
-        """Return how far what is left of the series may take each component of a state in a period."""
+        """Return how far the rest of the series can move any component of a state in a period."""
         return self.tail * max(combined(image(sizes_of(self.A), box.state), image(sizes_of(self.B), box.torque)))
 
     def beside(self, period: Period, box: Box, wrong: Fraction) -> Column:
-        """Return what a period at most adds to what `sampled` makes of samples, and `ways` of torques from outside and of
-        torques that are held, of up to `wrong`."""
+        """Return what a period adds at most to the linear motion of samples (`sampled`) and to the effect (`ways`) of
+        external torques and of held torques of up to `wrong`."""
         rounded = added([*box.state, 9 * period.outside, 3 * wrong]) / 2**PLACES
         shaken = [period.outside * x + self.unseries(box) + rounded for x in self.bent]
         return combined(image(self.carry, period.over), shaken)
 
     def hurried(self, period: Period, box: Box, radii: Column, wrong: Fraction) -> Fraction:
-        """Return a bound of how far w' is at all times from what is linear in the last sample."""
+        """Return a bound, at all times, of the part of w' that is not linear in the last sample."""
         moved = combined(image(self.given, [wrong] * 3), image(self.carry, period.over))
         moved = [x + period.outside * y + self.unseries(box) for x, y in zip(moved, self.nudged, strict=True)]
         torques = [(wrong + period.outside) * norm(row) for row in self.B[:3]]
@@ -251,7 +254,7 @@ class Appended:
 
 
 def image(rows: Rows, v: Column) -> Column:
-    """Return a matrix of what is not negative times a column of that."""
+    """Return the product of a nonnegative matrix and a nonnegative column."""
     return [up(x) for x in reach(rows, v)]
 
 
@@ -266,12 +269,12 @@ def total(row: Sequence[Fraction]) -> Fraction:
 
 
 def short(rows: Rows) -> Rows:
-    """Return numbers that are short and not tiny, and hardly larger."""
+    """Return slightly larger entries that are short and not tiny."""
     return [[up(max(x, LITTLE)) if x else x for x in row] for row in rows]
 
 
 def sizes_of(rows: Rows) -> Rows:
-    """Return the sizes of a matrix's entries."""
+    """Return the absolute values of a matrix's entries."""
     return [[abs(x) for x in row] for row in rows]
 
 
@@ -282,14 +285,14 @@ def parted(rows: Rows, blocks: Sequence[int]) -> list[Rows]:
 
 
 def sized(rows: Rows, down: Sequence[int], across: Sequence[int]) -> Rows:
-    """Return how much longer each block of a matrix makes a vector at most."""
+    """Return a bound of the norm of each block of a matrix."""
     columns = [parted(transpose(part), across) for part in parted(rows, down)]
     return [[longer(block) for block in row] for row in columns]
 
 
 def longer(block: Rows) -> Fraction:
-    """Return a bound of how much longer a matrix of no more than two rows and columns makes a vector: of two by two half the
-    sum of |(a + d, b - c)| and |(a - d, b + c)|."""
+    """Return a bound of the norm of a matrix of at most two rows and columns: for two by two, half the sum of |(a + d, b -
+    c)| and |(a - d, b + c)|."""
     if len(block) < 2 or len(block[0]) < 2:
         return norm([x for row in block for x in row])
     (a, b), (c, d) = block
@@ -297,8 +300,8 @@ def longer(block: Rows) -> Fraction:
 
 
 def follow(period: Period, begun: Column, periods: int) -> tuple[Column, Column]:
-    """Return bounds of samples at the start of each of so many periods, the first of which is told, and after them. They are
-    in whole multiples, rounded up."""
+    """Return bounds of the samples at the start of all of so many periods, given those at the first, and bounds after the
+    last one. They are rounded up to whole multiples."""
     rows, (now, more) = (
         [list(map(multiple, row)) for row in period.grown],
         (list(map(multiple, x)) for x in (begun, period.more)),
@@ -313,7 +316,7 @@ def follow(period: Period, begun: Column, periods: int) -> tuple[Column, Column]
 
 
 def after(period: Period, begun: Column, periods: int) -> Column:
-    """Return bounds of samples after so many periods, as (r+ <= grown r + more) is taken twice, and twice again."""
+    """Return bounds of samples after so many periods, by repeated squaring of r+ <= grown r + more."""
     grown, more = period.grown, period.more
     while periods:
         if periods & 1:

@@ -65,7 +65,7 @@ class System:
                 demand(low < high, "an interval is empty")
                 self.box[name] = low, high
         given = {name: known(var(name) + self.shift.get(name, 0)) for name in {*rates.inputs, *turning}}
-        # Of a cosine what it lacks to one is the variable, so that all variables vanish at the equilibrium.
+        # The variable of a cosine is 1 - cos, so that all variables vanish at the equilibrium.
         given |= {f"cos.{x}": known(1 - var(f"cos.{x}")) for x in self.angles}
         outputs = rates.run(given, Exactly(), count)
         for role in roles:
@@ -77,8 +77,8 @@ class System:
 
     @cached_property
     def facts(self) -> list[Poly]:
-        """Return what is negative nowhere: the sides of the box, and of an angle what Taylor's series leave, times
-        x for the sine. (Each is the integral of the one before, and so they alternate for x > 0.)"""
+        """Return nonnegative polynomials: the sides of the box, and for an angle the remainders of Taylor's series, times x
+        for the sine. (Each is the integral of the one before, and so they alternate for x > 0.)"""
         sides = [side for name, (low, high) in self.box.items() for side in (var(name) - low, high - var(name))]
         for name in self.angles:
             series, term = {"cos": poly(0), "sin": poly(0)}, poly(1)

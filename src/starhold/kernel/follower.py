@@ -1,4 +1,4 @@
-"""A loop in which the torque that acts comes later than the law asks for it. Docs/kernel.md, section 10."""
+"""A loop whose applied torque lags the command. Docs/kernel.md, section 10."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ from .sentences import above, below
 
 ZERO = Fraction(0)
 FIRST, REST = "|e", "|e rest"
-"""Under which the sizes have those of a and b, into which e is divided of a torque that is late."""
+"""The names of the sizes of a and b, the two parts of a late torque's error e."""
 SPENT, SPARE = Fraction(1, 4), Fraction(1, 8)
-"""The share of what is forgotten that pays for the work of what is late, and that which does for nothing."""
+"""The share of the decay of weight a^2 that pays for the work of the late torque, and the share that is held in reserve."""
 LATE = "late.torque."
-"""How the names of its numbers begin."""
+"""The prefix of its numbers' names."""
 KNOWN = "kept", "mean", "moment"
 """The numbers of a torque whose components all approach the command alike: the share of its error that is left at the end of
-a period, in its mean, and in the mean weighted by the time that is left."""
+a period, in its mean, and in the mean weighted by the remaining time."""
 WITHIN = f"{LATE}most"
-"""How far the torque that acts may be off, of one that follows otherwise beyond."""
+"""The largest error of the applied torque for which its numbers hold."""
 
 
 @dataclass(frozen=True)
 class Late:
-    """A torque that is late, off by e: |e| is at most kept |e| + how much what is asked for changes, a period later. In the
-    mean of a period it is off by at most mean |e|. |e| <= a + b, with sets of V + weight a^2; in the beginning |e| <= begun,
-    and b <= rest."""
+    """A torque that lags the command, with an error e: a period later |e| is at most kept |e| plus the change of the
+    command, and in the mean of a period it is at most mean |e|. |e| <= a + b, with sets of V + weight a^2; at the start |e|
+    <= begun and b <= rest."""
 
     kept: Fraction
     mean: Fraction
@@ -64,19 +64,19 @@ class Late:
 
     @property
     def ends(self) -> tuple[Fraction, Fraction]:
-        """Torques that are held and do no less at the beginning and at the end of a period, for |e| = 1."""
+        """Held torques, at the beginning and at the end of a period, with at least its effect for |e| = 1."""
         return min(2 * self.mean, Fraction(1)), self.mean
 
     @property
     def moved(self) -> Fraction:
-        """One that is held moves the rates evenly, and does no less through them, for |e| = 1."""
+        """The held torque that moves the rates evenly and has at least its effect through them, for |e| = 1."""
         return min(3 * self.mean, Fraction(1))
 
 
 @dataclass(frozen=True)
 class Change:
-    """How much a torque that is late changes in a period: |Mx| + rest; and what is kept of |e|, with what it does to that
-    itself. So a becomes kept a + |Mx|, and b kept b + rest."""
+    """The change of a late torque's error in a period: |Mx| + rest, and the share `kept` of |e|, including its effect on
+    itself. So a becomes kept a + |Mx|, and b becomes kept b + rest."""
 
     M: Rows
     rest: Fraction
@@ -84,15 +84,15 @@ class Change:
 
     @property
     def settled(self) -> Fraction:
-        """Return what b comes down to."""
+        """Return the limit that b approaches."""
         demand(self.kept < 1, "what is late is not forgotten")
         return up(self.rest / (1 - self.kept))
 
 
 class Costs(NamedTuple):
-    """The costs of a torque that is late: what it does to V in a period, for each unit of its mean, of that which moves the
-    rates, and of the product of both; works: `more` times its mean |Fx|, with F for how far its mean moves the rates, by
-    `far` for each unit of what moves them."""
+    """What a late torque adds to V in a period, for each unit of its mean, of the torque that moves the rates, and of their
+    product. far: how far the latter moves the rates, for each unit. works: F for such a displacement; the mean torque then
+    does work of at most `more` |Fx|, for each unit."""
 
     mean: Fraction
     moved: Fraction
@@ -103,7 +103,7 @@ class Costs(NamedTuple):
 
 
 class Follower(Reader):
-    """A loop in which the torque may come late."""
+    """A loop whose applied torque may lag the command."""
 
     near: Near
     h: Fraction
@@ -121,8 +121,8 @@ class Follower(Reader):
     late: Late | None
 
     def sways(self, radii: list[Fraction]) -> None:
-        """Take in what noise adds near the target: rate, turn and the torque that acts, if it lags, and then what momentum
-        makes of these."""
+        """Take the bounds of what noise adds near the target to the rate, to the turn and, if it lags, to the applied
+        torque; then of what momentum adds to these."""
         count = len(self.near.A) // 3
         (w, q, *torque), (faster, farther, *more) = radii[:count], radii[count:] or [ZERO] * count
         self.swayed, self.apart = (w, q), (faster, farther)
@@ -130,13 +130,14 @@ class Follower(Reader):
 
     @property
     def away(self) -> Radii:
-        """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
+        """Return how far motions are from the linear one, because of noise and of the offset at which the slow torque holds
+        the body."""
         return self.swayed[0] + self.leant[0], self.swayed[1] + self.leant[1]
 
     def follow(self, numbers: Numbers) -> Late | None:
         """Read how late the torque is, if it is."""
-        # Of what nears what is asked for alike in all components how exactly it is known. What noise makes of the torque
-        # that acts, and what momentum makes of that; how large that of the linear motion is, and how far off it is at first.
+        # For a lag that is alike in all components, how exactly it is known. What noise adds to the applied torque, and what
+        # momentum adds to that; the size of the linear motion's torque, and that of its error at the start.
         self.inexact, self.drawn, self.applied, self.unsettled = list[Fraction](), AT_REST, ZERO, ZERO
         if f"{LATE}mean" not in numbers:
             return None
@@ -149,7 +150,7 @@ class Follower(Reader):
             self.inexact = [x - y for x, y in zip(most, least, strict=True)]
             demand(min(self.inexact) >= 0, "a torque is late otherwise than it is")
             self.near, self.shares = self.near.lagging(self.h, *most), (most, least)
-        # What the law's torque has beside that near its target.
+        # The law's torque minus its linear part near the target.
         spun = [with_momentum(p - g) for p, g in zip(self.pull, self.bend, strict=True)]
         self.gyrating = spun, minus(self.speeding, spun)
         self.beyond = minus(self.loop.u, apply(self.near.torque, [var(name) for name in STATE]))
@@ -158,7 +159,7 @@ class Follower(Reader):
 
     @property
     def alike_in_words(self) -> str:
-        """How all components near what is asked for, if they do so alike."""
+        """How all components approach the command, if they do so alike, in words."""
         if not self.inexact:
             return ""
         (*_, moment), (kept, mean, least) = self.shares
@@ -168,25 +169,25 @@ class Follower(Reader):
         )
 
     def of_level(self, c: Fraction) -> Sizes:
-        """Return how far off the torque is where V + weight a^2 is no more than c."""
+        """Return bounds of the torque's error where V + weight a^2 is at most c."""
         return {FIRST: root(up(c / self.late.weight)), REST: self.late.rest} if self.late else {}
 
     def behind(self, sizes: Sizes, rest: bool = False) -> Behind:
-        """Return by how much the torque is off at most as it is late, or by the b of it."""
+        """Return bounds of the late torque's error, or of its part b alone."""
         if self.late is None:
             return Behind(ZERO, ZERO, ZERO)
         size = sizes[REST] if rest else sizes[FIRST] + sizes[REST]
         return Behind(size, self.late.mean * size, self.late.moved * size)
 
     def change_in(self, tube: Tube) -> Change | None:
-        """Return how much e changes in a period, in sets of V."""
+        """Return the change of e in a period, on sets of V."""
         if (late := self.late) is None:
             return None
         sizes, h, u, least = tube.sizes, self.h, self.loop.u, tube.region.least
         near = tube.region.sizes | {"v": 1 - least}
         bent, curved = (felt(self.beyond, letter, sizes) for letter in "wq")
-        # The rates change by what is linear in the state and in the rate, with momentum; by what is not; by what is late;
-        # and by how that changes the gyroscopic acceleration.
+        # The rates change by terms linear in the state and, with momentum, in the rate; by nonlinear ones; by the late
+        # torque; and by what these changes do to the gyroscopic acceleration.
         spun, left = self.gyrating
         (Aw, Aq), w, gyrating = (
             (self.step[RATE], self.step[TURN]),
@@ -197,7 +198,7 @@ class Follower(Reader):
         demand((back := h * stretch(tube.bent)) < 1, "the period is too long for the rates")
         more = 1 / (1 - back)
         aside = h / 2 * sizes[SPEED] * root(2 * (1 - least + tube.turned))
-        # How much it changes with how far rates and turn are from where they go linearly, and with where they go.
+        # The command changes as rates and turn depart from their linear motion, and as they follow it.
         linear, turn = (stretch([row[part] for row in self.near.torque]) for part in (RATE, TURN))
         turned = turn + curved
         off = linear + turned * h / 2
@@ -209,16 +210,16 @@ class Follower(Reader):
         return Change(M, rest, late.kept + (off + grown) * h * self.light * late.mean)
 
     def mistaken(self, tube: Tube) -> Fraction:
-        """Return by how much the command is off for errors of what the law is told, and its own."""
+        """Return a bound of the command's error, including the effect of measurement errors."""
         pushed = self.pushed(tube.sizes)
         return self.misread(tube.region)[0] + pushed["both"] - pushed["outside"]
 
     def asks(self, radii: Radii) -> Fraction:
-        """Return how large the law's torque is at most that is linear in w and q of these sizes."""
+        """Return a bound of the law's linear torque for w and q of these sizes."""
         return added([stretch([row[k] for row in self.near.torque]) * x for k, x in zip((RATE, TURN), radii, strict=True)])
 
     def nears(self, tube: Tube) -> None:
-        """Begin the linear motion near the target with the torque that is asked for at one of its states."""
+        """Begin the linear motion near the target, with the torque commanded at one of its states."""
         if not self.inexact:
             return
         sizes, heeded, (turned, rated) = tube.sizes, felt(self.heeded, "w", tube.sizes), self.noise
@@ -228,7 +229,7 @@ class Follower(Reader):
         self.unsettled = 4 * (self.applied + noisy + heeded * (z[0] + rated))
 
     def entered(self, tube: Tube) -> Rows:
-        """Return the matrix of an ellipsoid that holds the linear motion in a tube's region as it begins."""
+        """Return the matrix of an ellipsoid that contains the linear motion in a tube's region as it begins."""
         X = widened(tube.region.X, self.away)
         if not self.inexact:
             return X
@@ -236,8 +237,8 @@ class Follower(Reader):
         return beside(plus(X, X), none + none) + beside(beside(none, none), torque)
 
     def lateness(self, tube: Tube) -> tuple[Fraction, Fraction]:
-        """Return how late the torque is at most near the target once that of larger sets is forgotten: what of that the
-        linear motion has in it, and what not."""
+        """Return bounds of the late torque's error near the target, once that of larger sets is forgotten: the part within
+        the linear motion, and the rest."""
         assert self.late is not None
         sizes, drift, turned = tube.sizes, norm(tube.end), tube.turned
         pace, errors, changed = 1 / (1 - self.late.kept), 2 * self.mistaken(tube), self.renewed(sizes, self.loop.u)
@@ -245,7 +246,8 @@ class Follower(Reader):
         if not self.inexact:
             curved = felt(self.beyond, "w", sizes) * drift + felt(self.beyond, "q", sizes) * turned
             return ZERO, up((linear + curved + changed + errors) * pace)
-        # What is linear, and what momentum makes of the rates, changes within the motion; errors filtered are errors.
+        # The linear command, and what momentum adds per unit of rate, change within the motion; errors that are filtered
+        # remain errors.
         curved = felt(self.bare, "w", sizes) * drift + felt(self.bare, "q", sizes) * turned
         spun, slow = (felt(self.heeded, "w", sizes) * drift, [with_momentum(p, "r") for p in self.loop.u])
         rest = curved + self.renewed(sizes, minus(self.loop.u, slow)) + self.renewed(sizes, self.leaning)
@@ -255,33 +257,33 @@ class Follower(Reader):
         return up((linear + spun + self.renewed(sizes, slow)) * pace + errors), up(rest * pace)
 
     def spun_late(self, tube: Tube, fast: Fraction) -> Fraction:
-        """Return how late is at most what the law's torque makes of momentum and a rate of up to `fast`, and of what
-        momentum makes of noise: no more than twice itself, and no more than it changes."""
+        """Return a bound of the lag error of the torque that the law commands for momentum times a rate of up to `fast`, and
+        for momentum times noise: at most twice that torque, and at most its change."""
         if not (self.inexact and self.late):
             return ZERO
         changed = norm(tube.end) / (1 - self.late.kept) + 2 * self.swayed[0]
         return felt(self.heeded, "w", tube.sizes) * (min(2 * fast, changed) + 2 * self.apart[0])
 
     def spun_on(self, tube: Tube, spun: Fraction, fast: Fraction) -> Fraction:
-        """Return a bound of the torque, in the mean of a period, by which the drift of the rates is not that of the linear
-        motion, because what momentum and a rate ask for acts late: A has of this what acts, and samples have all of it.
-        spun: what `spun_late` returns."""
+        """Return a bound of the torque, in the mean of a period, by which the drift of the rates differs from that of the
+        linear motion, because the command for momentum and a rate lags: A contains what is applied, and samples contain all
+        of it. spun: the result of `spun_late`."""
         if not (self.inexact and self.late):
             return ZERO
         rate = self.swayed[0] if fast else tube.region.sizes[SPEED]
         return self.late.mean * (spun + felt(self.heeded, "w", tube.sizes) * rate)
 
     def paced(self, tube: Tube, pulled: Fraction, torque: Fraction | None = None) -> Fraction:
-        """Return how large the acceleration is in the mean of a period, of a linear motion for which as much is asked as
-        `pulled`, with a torque of no more than that, or as told."""
+        """Return a bound of the acceleration, in the mean of a period, of a linear motion whose command gives an
+        acceleration of up to `pulled`, and whose applied torque is at most `torque`, by default the tube's."""
         if not (self.inexact and pulled and self.late):
             return pulled
         acts = tube.region.sizes[REST] + stretch(self.loop.given) * pulled if torque is None else torque
         return (1 - self.late.mean) * pulled + self.late.mean * self.light * acts
 
     def ends(self, tube: Tube) -> tuple[list[Fraction], Fraction, Fraction]:
-        """Return torques at the beginning and at the end of a period, and a turn, that do no less near the target than a
-        torque that is late; and one that is held and moves the rates, evenly, no less."""
+        """Return torques at the beginning and at the end of a period, and a turn, that near the target have at least the
+        effect of a late torque; and a held torque that moves the rates evenly and has at least its effect."""
         if (late := self.late) is None:
             return [ZERO, ZERO], ZERO, ZERO
         rest, e = tube.region.sizes[REST], tube.late.most
@@ -289,14 +291,14 @@ class Follower(Reader):
             return [e * x for x in late.ends], ZERO, tube.late.moved
         (_, mean, moment), (*_, least) = self.shares
         _, uneven, further = self.inexact
-        # The rates are where the mean takes them, but for a share that is nothing at both ends and concave between.
+        # The rates follow the mean, except for a part that is zero at both ends and concave between them.
         curved = 4 * moment - 2 * mean + 3 * uneven
         torques = [uneven * e + 2 * rest * x for x in (moment, mean - least)]
         return torques, self.h**2 / 2 * self.light * (further + uneven / 2) * e, curved * e + late.moved * rest
 
     def paid(self, late: Late, change: Change, form: Rows, costs: Costs) -> tuple[Rows, Fraction, Fraction]:
-        """Return what is left of a form where the fall of weight a^2 pays for what is late, what beside that adds to V, and
-        the share of the sum that is to spare."""
+        """Return what is left of a form once the decay of weight a^2 has paid for the late torque, what this adds to V
+        besides, and the share of the sum that is in reserve."""
         forgotten = 1 - change.kept
         demand(forgotten > 0, "what is late is not forgotten")
         falls, rises = late.weight * forgotten / self.h, late.weight / (self.h * forgotten)
@@ -309,8 +311,8 @@ class Follower(Reader):
 
 
 def together(parts: list[tuple[Fraction, Rows]], sizes: Sequence[Fraction]) -> Rows:
-    """Return a matrix that makes a state no shorter than the sum of c |Rx|, best where |x_i| is of these sizes: its square
-    is no more than the sum of (c |Rx|)^2 / s, with shares s that are 1 together."""
+    """Return a matrix M with |Mx| >= the sum of c |Rx|, tightest where |x_i| is of these sizes: the square of the sum is at
+    most the sum of (c |Rx|)^2 / s, with shares s that add up to 1."""
     weights = [c * norm(reach(R, sizes)) for c, R in parts]
     return [
         [c * root(sum(weights, ZERO) / weight) * x for x in row]

@@ -1,9 +1,9 @@
 """A loop with its torque held between samples: how V changes in a period, and the linear motion, from sets of states.
 
-J w' = u + d - w x Jw with u = the law's torque at the last sample and an error. What errors and torques d from outside do is
-bounded by what they are; what is of higher order in the period, or not linear, by the size of the set, and so is what the
-law's torque and the motion have of a moving target, wheels and a torque that the law is told, and what changes of these do.
-Docs/kernel.md, 10.
+J w' = u + d - w x Jw, where u is the law's torque at the last sample plus an error. The effects of errors and of external
+torques d are bounded by their sizes. Terms of higher order in the period, and nonlinear ones, are bounded by the size of the
+set. So are the terms of a moving target, of wheels and of an external torque that the law knows, in the law's torque and in
+the motion, and the effects of their changes. Docs/kernel.md, 10.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from .regions import (
 
 WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
 NEARER = Fraction(17, 16)
-"""How near to what they come down to errors are counted that grow with the motion."""
+"""Errors that grow with the motion count as settled within this factor of their limit."""
 
 
 class Held(Follower):
@@ -60,7 +60,7 @@ class Held(Follower):
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
         self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
-        # What noise adds near the target, and what momentum makes of that.
+        # What noise adds near the target, and what momentum adds to that.
         self.swayed = self.apart = AT_REST
         self.random = numbers.get("noise.torque") or ZERO
         more = {"outside": self.random, "error": norm([loop.added or ZERO] * 3)}
@@ -70,7 +70,7 @@ class Held(Follower):
             [numbers.get(f"{kind}.{name}") or Fraction(0) for name in ("attitude", "rate")] for kind in ("noise", "error")
         )
         self.turned, self.rated = (x + y for x, y in zip(self.noise, errors, strict=True))
-        # How much more what is told is off for each unit of rate and acceleration, since when, and what is kept of more.
+        # How much measurement errors grow per unit of rate and acceleration, over what time, and the share left then.
         of = ("rate", "acceleration")
         self.moving = [[numbers.get(f"error.{name}.per.{x}") or ZERO for x in of] for name in ("attitude", "rate")]
         self.ago, self.held_back = (numbers.get(f"error.{name}") or ZERO for name in ("ago", "kept"))
@@ -95,12 +95,11 @@ class Held(Follower):
         self.change = [numbers.get(name) or Fraction(0) for name in CHANGE] if CHANGE[0] in numbers else None
         self.bounded |= dict(zip(CHANGE, self.change or [], strict=False))
         self.beside = minus(loop.balance(NONE), free)
-        # What of it vanishes with the state is in V' as it is: that by momentum of wheels does no work.
+        # The part that vanishes with the state enters V' as it is, because the momentum of wheels does no work.
         commanded, turning = minus(loop.u, self.u), growing(self.beside)
         self.more = growing(commanded)
         left = [p + q for p, q in zip(minus(commanded, self.more), minus(self.beside, turning), strict=True)]
-        # What does not: that of momentum and the target's rate is slow, the rest by the first that it has of what comes from
-        # outside.
+        # Of the rest, momentum times the target's rate is slow, and other terms are bounded by their first external factor.
         self.slow = [with_momentum(p, "r") for p in left]
         self.leaning = [with_momentum(p, "r") for p in minus(self.beside, turning)]
         self.rigid = {x: [first(p, x) for p in minus(left, self.slow)] for x in ("e", "a", "h", "r")}
@@ -108,7 +107,7 @@ class Held(Follower):
         self.N, h = inverse(loop.given), self.h
         self.widths, self.light = [norm(row) for row in self.N], stretch(self.N)
         demand(self.off * self.light < 1, "the inertia is known too badly")
-        # How large the slow torque is, how far a torque that lasts turns the body, and how far this one.
+        # The size of the slow torque, and how far a lasting torque, and this one, turns the body.
         self.lasting = felt(self.slow, "h", self.others) * self.size("h")
         stiff = [[-x for x in row[TURN]] for row in self.near.torque]
         self.soft = stretch(inverse(stiff)) if self.lasting else Fraction(0)
@@ -118,15 +117,15 @@ class Held(Follower):
         self.bend = apply(self.N, self.gyroscopic)
         self.rate = loop.slopes_along(V, self.accelerated)
         commanded_rates = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
-        # What the law's torque has beside that near its target.
+        # The law's torque minus its linear part near the target.
         on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
         self.heeded = [with_momentum(p) for p in loop.u]
         self.unlike = [p.at(on) for p in minus(minus(loop.u, linear), self.heeded)]
         self.spun = [with_momentum(p) for p in self.gyroscopic]
         self.tumbled = minus(self.gyroscopic, self.spun)
-        # What wheels' momentum makes of the rates, beside what the law's torque does about it.
+        # What wheels' momentum adds per unit of rate, as far as the law's torque does not cancel it.
         self.turning = [with_momentum(p - g) for p, g in zip(self.more, self.gyroscopic, strict=True)]
-        # The acceleration at samples, what V' has of the rates, and that linearly.
+        # The acceleration at samples, the factors of the rates in V', and their linear part.
         rates = apply(self.near.rates, x)
         self.odd = [p.at(on) for p in minus(self.pull, rates)]
         self.speeding = [(p - g - rate).at(on) for p, g, rate in zip(self.pull, self.bend, rates, strict=True)]
@@ -138,15 +137,15 @@ class Held(Follower):
         at = dict.fromkeys((*STATE, "v", *self.others), 0)
         self.steepness = [[p.slope(name).at(at).number for name in STATE] for p in steep]
         self.steep = minus(steep, apply(self.steepness, x))
-        # Without the first V is even in q, and motions stay where q0 > 0.
+        # Without s, V is even in q, and motions stay where q0 > 0.
         self.s, self.G = form_of(loop)
         self.even = self.s == 0
-        # What a torque does to V: felt x.
+        # The effect of a torque on V: felt x.
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
         self.parted = minus(self.beside, turning), turning
         self.worked = [[dot(apply(self.felt, x), parts)] for parts in self.parted]
         self.late = self.follow(numbers)
-        # What torques at the beginning and at the end of a period do, half of each if they are held, and what turns do.
+        # The effects of torques at the beginning and at the end of a period, half of each if held, and those of turns.
         ways = [[[c * x for x in row] for c in (h / 2, turn) for row in self.N] for turn in (h * h / 4, ZERO)]
         ways.append(scalar(0) + scalar(1))
         self.ways = [rows + [[ZERO] * 3] * (len(self.near.A) - len(STATE)) for rows in ways]
@@ -161,8 +160,8 @@ class Held(Follower):
 
     @cached_property
     def motion(self) -> tuple[Factored, Poly, Fraction]:
-        """Return -V' in the mean of a period without pushes, up to a derivative of V', and that, with its share in the mean:
-        the law's torque is held, and wheels' momentum turns against the body."""
+        """Return the mean of -V' over a period without disturbances, up to a derivative of V', then that derivative, and its
+        share in the mean: the law's torque is held, and wheels' momentum turns against the body."""
         loop, rates, share = self.loop, [self.rate], Fraction(1)
         carried = dict(zip(MOMENTA, cross(loop.H, loop.w), strict=True)) if loop.wheels else {}
         mean = self.rate
@@ -180,8 +179,8 @@ class Held(Follower):
         return [[entry + c * (i == k > 2) for k, entry in enumerate(row)] for i, row in enumerate(self.G)]
 
     def region(self, c: Fraction) -> Region:
-        """Return what holds {V <= c}. Over w V is least s (1 - q0) + q.Sq, with S >= -lean, and |q|^2 <= 2 (1 - q0); without
-        s, where q0 > 0, with S >= stiff."""
+        """Return a region that contains {V <= c}. Over all w, the least V is s (1 - q0) + q.Sq, with S >= -lean, and |q|^2
+        <= 2 (1 - q0); without s, where q0 > 0, with S >= stiff."""
         (ww, wq), (_, qq) = ([[row[b] for row in self.G[a]] for b in (RATE, TURN)] for a in (RATE, TURN))
         S = plus(qq, times(transpose(wq), times(inverse(ww), wq)), -1)
         stiff = min(S[i][i] + abs(S[i][i]) - sum(map(abs, S[i])) for i in AXES)
@@ -190,7 +189,7 @@ class Held(Follower):
         least = 1 - up(c / stiff if self.even else c / (self.s - 2 * lean))
         demand(least > -(not self.even), "a level holds the other quaternion of the target")
         if self.even:
-            # No root of a number below 1 is below it.
+            # The root of a number below 1 is not below that number.
             least = max(least, least / root(least))
         turn = root(1 - least * least) if least > 0 else Fraction(1)
         X = [[c * x for x in row] for row in inverse(self.under)]
@@ -200,26 +199,27 @@ class Held(Follower):
         return Region(X, sizes | self.others, least)
 
     def planned(self, sizes: Sizes) -> Fraction:
-        """Return how far the torque is at most from that of a plan's moves, if there is one."""
+        """Return a bound of the torque's distance from the moves of a plan, if there is one."""
         return self.plan.error(as_told(sizes, self.wrong(sizes))) if self.plan else ZERO
 
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
-        """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
+        """Return bounds, in a tube, of the external torque, and of that torque together with the command's error, for a
+        turning target too."""
         outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
         return {"outside": outside + sizes[LOAD], "both": outside + error + sizes[LOAD] + self.planned(sizes)}
 
     def speeds(self, sizes: Sizes) -> Sizes:
-        """Return how fast the variables of a motion without pushes change at most."""
+        """Return bounds of the variables' rates of change without disturbances."""
         w = sizes[SPEED]
         speeds = dict.fromkeys(("q0", *STATE[TURN]), w / 2) | dict.fromkeys(MOMENTA, w * self.size("h"))
         return speeds | {x: sizes[f"u{k + 1}"] + most(self.bend[k], sizes) for k, x in enumerate(STATE[RATE])}
 
     def tube(self, region: Region, amiss: list[Fraction] | None = None) -> Tube:
-        """Return what motions stay in for a period. amiss: how much more attitude and rate are off that the law is told as
-        the body moves, by default a little more than after a motion that did not leave the tube."""
+        """Return a set that motions from a region do not leave for a period. amiss: additional errors of measured attitude
+        and rate due to the motion, by default slightly more than after a motion that did not leave the tube."""
         sizes = region.sizes
         near = sizes | {"v": 1 - region.least}
-        # In an ellipsoid c.x is no more than the root of c.Xc.
+        # In an ellipsoid c.x is at most the root of c.Xc.
         even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
         even = [min(x, sizes.get(PULL, x)) for x in even]
         odd = [most(p, near) for p in self.odd]
@@ -268,14 +268,14 @@ class Held(Follower):
         return Tube(region, far, drift, turned, steady, pushed, stale, uneven, bent, late, end)
 
     def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction, Fraction]:
-        """Return Q, H, F, p, r and f such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx. With
-        a torque that is late V + weight |e|^2 does, and of that sum a share f is to spare."""
+        """Return Q, H, F, p, r and f: V changes in a period by at most h (p |Fx| + r - x.Qx), and V <= x.Hx. With a late
+        torque this is true of V + weight |e|^2, and f is the share of that sum in reserve."""
         h, region, L, (falling, last, share) = self.h, tube.region, self.rate, self.motion
         near = region.sizes | {"v": 1 - region.least}
         change, late = self.change_in(tube), self.behind(region.sizes, rest=True)
         push = tube.steady + tube.pushed + late.mean
         demand(push > 0, "nothing pushes")
-        # How far pushes take the rates from where they go without: momentum turns with the body, less what they do to that.
+        # How far disturbances move the rates from the undisturbed motion, in which momentum turns with the body.
         calm, slower = self.unlike_body(tube.sizes, self.parted)
 
         def moved_by(p: Fraction) -> list[Fraction]:
@@ -285,7 +285,7 @@ class Held(Follower):
         away = moved_by(push + calm + late.moved - late.mean)
         slope = {name: most(L.slope(name), tube.sizes) for name in ("q0", *STATE)}
         moved = [*tube.drift, *[tube.turned] * 3, *[h * tube.sizes[SPEED] * self.size("h")] * 3]
-        # What changes of momentum do to V, which is less than what their torques do to the body.
+        # The effect on V of changes of momentum, which is smaller than that of their torques on the body.
         still, worse = self.unlike_body(tube.sizes, self.worked)
         curved = {name: [most(p, tube.sizes) for p in self.curvature[name]] for name in STATE[RATE]}
         steep = {
@@ -294,14 +294,14 @@ class Held(Follower):
         }
 
         def shaken(away: list[Fraction]) -> Fraction:
-            # What V' has of the rates, which pushes change.
+            # The terms of V' in the rates, which disturbances change.
             changed = sum((d / 2 * x for d, x in zip(away, steep.values(), strict=True)), worse * norm(away))
             return changed + h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
 
         rest = still + shaken(away) + share * fastest(last, tube.sizes, self.speeds(tube.sizes))
-        # What pushes do to V grows with what the state does in the period: linearly, and what is left.
+        # The effect of disturbances on V grows as the state changes in the period: linearly, and by a remainder.
         drift = self.astray(tube, tube.late.moved - late.moved)
-        # Of the acceleration that an inertia resists the part that is linear in the state is no push.
+        # Of the acceleration that an inertia resists, the part linear in the state is no disturbance.
         sudden = (tube.stale + tube.late.most) * self.light
         kept = push - tube.sizes[LOAD] + self.load(tube.sizes, norm(drift) / h + sudden)
         turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
@@ -322,7 +322,7 @@ class Held(Follower):
         over = self.form(self.s / (1 + region.least))
         form, spare = outweighed(least_form(falling, region), self.off * more, F, self.near.rates), Fraction(1)
         if self.late and change:
-            # What a torque that is late does for each unit of it.
+            # The effect of a late torque, for each unit of it.
             alone = moved_by(Fraction(1))
             even = norm(reach(self.felt, [h * n for n in self.widths] + [ZERO] * 3))
             costs = Costs(left / 2, push / 2 * even + shaken(alone), even / 2, norm(alone), worked, more)
@@ -338,28 +338,28 @@ class Held(Follower):
         )
 
     def astray(self, tube: Tube, lasting: Fraction = ZERO, drift: list[Fraction] | None = None) -> list[Fraction]:
-        """Return how far the rates are in a period from where the acceleration that is linear in the sample, and that of a
-        torque that is `lasting`, take them, while they drift so far."""
+        """Return how far the rates depart, in a period, from where the acceleration linear in the sample and that of a
+        torque `lasting` take them, while they drift so far."""
         sizes = tube.region.sizes | {"v": 1 - tube.region.least}
         left = [most(p, sizes) for p in self.speeding]
         columns = zip(left, reach(tube.bent, drift or tube.drift), self.N, strict=True)
         return [self.h * (a + b + (tube.push + tube.late.moved - lasting) * norm(n)) for a, b, n in columns]
 
     def corners(self) -> list[Rows]:
-        """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
+        """Return matrices between which A lies, for samples followed by Ax, with any momentum that the wheels may have."""
         return between(self.near, self.loop, self.size("h")) if self.loop.wheels else [self.near.A]
 
     def pulled(self, radii: Radii) -> Fraction:
-        """Return a bound of the acceleration that is linear in a motion with these |w| and |q|."""
+        """Return a bound of the linear acceleration for these |w| and |q|."""
         rows = self.near.rates
         return added([stretch([row[k] for row in rows]) * x for k, x in zip((RATE, TURN), radii, strict=True)])
 
     def linear(
         self, tube: Tube, fast: Fraction = Fraction(0), pulled: Fraction = Fraction(0)
     ) -> list[tuple[Rows, Fraction]]:
-        """Return pairs B, b such that samples in the tube's region are followed by x+ = Ax + the sum of B v, |v| <= b, with
-        A between those of `corners`: less what noise and a random torque add, and where the slow torque alone would hold the
-        body. fast, pulled: |w|, and what `pulled` returns, of motions to which momentum is to add nothing in A."""
+        """Return pairs B, b: samples in the tube's region are followed by x+ = Ax + the sum of B v, |v| <= b, with A between
+        those of `corners`. x excludes what noise and a random torque add, and the offset at which the slow torque alone
+        would hold the body. fast, pulled: |w|, and the result of `pulled`, of motions to whose A momentum adds nothing."""
         h, region, wide, turn = self.h, tube.region, tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
@@ -367,7 +367,7 @@ class Held(Follower):
         odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
         spun = self.spun_late(tube, fast)
         odd += spun
-        # What noise adds has in it what momentum makes of it, but not what it makes of that.
+        # What noise adds includes the effect of momentum on it to first order, not to second.
         noisy = felt(self.heeded, "w", near) * self.noise[1] * self.light
         at_ends, along, uneven = self.ends(tube)
         drift = norm(self.astray(tube, self.lasting + tube.steady - tube.uneven + tube.late.moved - uneven))
@@ -376,14 +376,14 @@ class Held(Follower):
         growing = "rh" + "e" * (self.gradual(tube.sizes) < 2 * self.size("e"))
         late = self.stale(tube.sizes, self.beside, letters=growing)
         steady = tube.uneven - self.lasting + tube.pushed - self.random + odd + tube.stale - late
-        # Of what momentum makes of the rates A has the rest of the drift.
+        # A contains the rest of the drift in what momentum adds per unit of rate.
         grown = (
             felt(self.spun, "w", tube.sizes) * drift + felt(self.tumbled, "w", tube.sizes) * norm(tube.drift)
         ) / 6 + late / 3
-        # In a whole period momentum and target change by twice what they do in the mean.
+        # Over a whole period momentum and target change by twice their mean change.
         moved = 2 * self.soft * self.stale(tube.sizes, self.slow)
         rolled = h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))
-        # As momentum changes, so does what it makes of noise.
+        # As momentum changes, so does its effect on what noise adds.
         if any(self.apart):
             change = 2 * self.changes(tube.sizes)["h"] / self.size("h")
             steady += change * self.apart[0] * stretch(self.loop.given) / h
@@ -392,6 +392,6 @@ class Held(Follower):
         return list(zip(self.ways, sizes, strict=True))
 
     def bend_between(self, tube: Tube) -> Fraction:
-        """Return how far q is at most, between two samples, from the straight line between them."""
+        """Return the largest distance of q, between two samples, from the chord between them."""
         fastest, sizes = norm(tube.drift) / self.h + (tube.stale + tube.late.most - tube.late.moved) * self.light, tube.sizes
         return self.h * self.h / 16 * (fastest + sizes[SPEED] ** 2 / 2 * sizes[ANGLE])

@@ -289,7 +289,7 @@ def apart(cases: Piecewise, added: Fraction) -> Poly:
     middle = total(ends.values()) * Fraction(1, 2)
     for case in cases:
         for beyond in (case.value - middle - added, middle - case.value - added):
-            demand(positive(case.guards, beyond) is False, "a memory adds more torque than is told")
+            demand(positive(case.guards, beyond) is False, "a memory adds more torque than is stated")
     return middle
 
 

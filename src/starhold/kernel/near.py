@@ -13,7 +13,8 @@ from .polynomials import apply, dot, var
 from .regions import STATE, with_momentum
 
 CHANGE = "told.change", "told.change.per.rate"
-"""How fast the torque changes that the law is told, per second, and more for each rad that the body turns."""
+"""How fast the external torque that the law knows changes, per second, and how much more for each rad that the body
+turns."""
 MOMENTA, ZERO = ("h1", "h2", "h3"), Fraction(0)
 HALF_ROOT = Fraction(7072, 10000)
 """At least the root of 1/2."""
@@ -25,10 +26,10 @@ AROUND = [
 
 
 class Near(NamedTuple):
-    """A loop near its target: the law's torque and the acceleration as matrices on (w, q); A, B and C = `commanded` so that
-    samples of x = (w, q), or of (w, q, torque) with a torque that lags, are followed by Ax + Bu + Cv, with a torque u held
-    beside the law's, and v beside what the law asks for; what a u does that grows to uh; the acceleration in the mean of a
-    period as matrices on x and on v; J^-1."""
+    """A loop linearised near its target: the law's torque and the acceleration as matrices on (w, q); A, B and C =
+    `commanded` with x+ = Ax + Bu + Cv at samples of x = (w, q), or of (w, q, torque) with a torque that lags, where u is
+    held in addition to the law's torque and v is added to the command; `grown`: the effect of a torque that grows to uh; the
+    acceleration in the mean of a period as matrices on x and on v; J^-1."""
 
     torque: Rows
     rates: Rows
@@ -41,13 +42,14 @@ class Near(NamedTuple):
     inverse: Rows
 
     def spun(self, law: Rows, body: Rows) -> Rows:
-        """Return what the law's torque and the body's add to A that are these matrices times the rates."""
+        """Return what torques of the law and on the body, which are these matrices times the rates, add to A."""
         both = plus(times(self.commanded, law), times(self.B, body))
         return plus([row + [ZERO] * (len(self.A) - 3) for row in both], times(self.grown, times(body, self.mean)))
 
     def lagging(self, h: Fraction, kept: Fraction, mean: Fraction, moment: Fraction) -> Near:
-        """Return the loop with a torque that is off from what is asked for by so much in the end of a period and in its
-        mean, for each unit at first: it is one more vector of the state. moment: in the mean by the time that is left."""
+        """Return the loop with a torque that lags, which is one more vector of the state. For each unit of its error at
+        first, `kept` is left at the end of a period, `mean` in its mean, and `moment` in the mean weighted by the remaining
+        time."""
         N, T, none = self.inverse, self.torque, [[ZERO] * 3 for _ in AXES]
         off = [[c * x for x in row] for c in (h * mean, h * h / 2 * moment) for row in N]
         commanded, acts = plus(self.B, off, -1), 1 - mean
@@ -63,7 +65,7 @@ class Near(NamedTuple):
 
 
 def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
-    """Return the linear loop with its torque held for h, where nothing comes from outside."""
+    """Return the linear loop with its torque held for h, without anything external."""
     at = loop.on_target | loop.still | {f"{letter}{k + 1}": 0 for letter in "erah" for k in AXES}
     torque, N = slopes(loop.u, STATE, at), inverse(loop.given)
     rates = times(N, torque)
@@ -73,7 +75,8 @@ def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
 
 
 def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:
-    """Return what wheels' momentum makes of the rates, as matrices: in the law's torque, and in that on the body."""
+    """Return what wheels' momentum adds per unit of rate, as matrices: to the law's torque, and to the torque on the
+    body."""
     names = {f"h{k + 1}": x for k, x in enumerate(at)}
     law, body = (slopes([with_momentum(p) for p in parts], RATES, names) for parts in (loop.u, loop.balance(NONE)))
     return law, body
@@ -89,11 +92,11 @@ def form_of(loop: AttitudeLoop) -> tuple[Fraction, Rows]:
 
 
 def between(near: Near, loop: AttitudeLoop, size: Fraction) -> list[Rows]:
-    """Return matrices between which A is with each momentum of wheels of up to a size."""
+    """Return matrices between which A lies for each momentum of the wheels up to a size."""
     ways = [near.spun(*spinning(loop, way)) for way in scalar(size)]
     return [reduce(lambda A, one: plus(A, *one), zip(ways, corner, strict=True), near.A) for corner in AROUND]
 
 
 def over_period(feedback: Rows, h: Fraction) -> Rows:
-    """Return the linear motion of (w, q) over a period in which the acceleration -feedback (w, q) does not change."""
+    """Return the linear motion of (w, q) over a period in which the acceleration -feedback (w, q) is constant."""
     return plus(beside(scalar(1), scalar(0)), feedback, -h) + plus(beside(scalar(h / 2), scalar(1)), feedback, -h * h / 4)

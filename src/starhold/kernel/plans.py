@@ -191,7 +191,7 @@ class Plan:
         units, moves = read_table(loop.claim.evidence["plan"], "units", "moves")
         self.units, self.count = [rational(x) for x in read_list(units, 6)], len(read_list(moves))
         demand(0 < self.count <= MOVES and subject["plan.moves"] == self.count, "a plan has another number of moves")
-        demand(min(self.units) > 0 and 2 * self.gap <= 1, "a plan is not properly told")
+        demand(min(self.units) > 0 and 2 * self.gap <= 1, "a plan is not properly stated")
         self.moves = [[matrix(part, 3, 6) for part in read_list(move, 4)] for move in moves]
         # What makes the motion relative to a target that turns as that to one at rest.
         spins = (cross(rate, apply(loop.given, rate)) for rate in (loop.rate, loop.w))

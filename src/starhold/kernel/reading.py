@@ -72,7 +72,7 @@ class Claim:
     evidence: Told[Any]
 
     def close(self) -> None:
-        """Refuse what was told and not read."""
+        """Refuse entries that were not read."""
         for table in (self.taken, self.programs, self.subject, self.numbers, self.evidence):
             table.close()
 
@@ -125,7 +125,7 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _stray(text: str) -> Any:
-    # A number outside of a text is no value that a reader takes.
+    # A number that is not written as a text becomes a value that no reader takes.
     return object()
 
 

@@ -1,4 +1,4 @@
-"""Sets of states of a loop with its torque held, and how large polynomials are there. Docs/kernel.md, 10."""
+"""Sets of states of a loop with its torque held, and bounds of polynomials on them. Docs/kernel.md, 10."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
 FAR = 1 << 100
-"""The largest bound that may settle."""
+"""The largest bound at which an iteration may settle."""
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
 SPEED, ANGLE, PULL, LOAD = "|w", "|q", "|u", "|j"
-"""Under which the sizes have those of |w| and |q|, of the acceleration that is linear in the state where it is known, and in
-a tube of the torque that an inertia near the given one adds."""
+"""The names of the sizes of |w| and |q|, of the linear acceleration where it is known, and in a tube of the torque due to an
+inertia near the given one."""
 AMISS = "|turn", "|rate"
-"""Under which those of a tube have how much more the told attitude and rate are off as the body moves."""
+"""The names, in a tube, of the additional errors of measured attitude and rate due to the motion."""
 TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]
 """The matrix of (x, y, z) × has x, y and z in these places with these signs: the permutation symbol."""
 Sizes = dict[str, Fraction]
@@ -39,22 +39,22 @@ class Region:
     least: Fraction
 
     def within(self, X: Rows, swayed: Radii = AT_REST) -> Region:
-        """Return the part that lies no further than `swayed` from an ellipsoid, of the state alone."""
+        """Return the part that lies within `swayed` of an ellipsoid of the state alone."""
         state = [row[: len(STATE)] for row in X[: len(STATE)]]
         sizes = {name: root(X[i][i]) + swayed[i // 3] for i, name in enumerate(STATE)}
         sizes |= {name: x + more for (name, x), more in zip(lengths(X).items(), swayed, strict=True)}
         return Region(widened(state, swayed), self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()}, self.least)
 
     def around(self, radii: Radii, pull: Fraction) -> Region:
-        """Return the part where |w| and |q| are no more than told, nor the acceleration that is linear in the state."""
+        """Return the part where |w|, |q| and the linear acceleration are within these bounds."""
         X = plus(scalar(0, 6), balls(radii), 2)
         sizes = {name: radii[i // 3] for i, name in enumerate(STATE)} | named((SPEED, ANGLE), [*radii])
         return Region(X, self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()} | {PULL: pull}, self.least)
 
 
 class Behind(NamedTuple):
-    """By how much the torque is off by what is late: at any time, in the mean, and one that is held, moves the rates evenly,
-    and so does no less to what they do in a period."""
+    """Bounds of the late torque's error: at any time, in the mean, and of a held torque that moves the rates evenly and so
+    has at least its effect on their motion in a period."""
 
     most: Fraction
     mean: Fraction
@@ -63,12 +63,12 @@ class Behind(NamedTuple):
 
 @dataclass(frozen=True)
 class Tube:
-    """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
-    drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time,
-    and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time.
-    Of what is held, `uneven` has not what errors that noise drives add linearly. `bent` bounds the slopes of the
-    gyroscopic acceleration in the rates; `late`: the torque that is off by what is late; `end`: how far the rates drift to
-    the end, where `drift` is as in a motion that drifts evenly and does no less."""
+    """A set that motions from a region do not leave for a period: its sizes (u of the held acceleration), the drift of the
+    rates, the turn of q, and the torques besides those that vanish with the state: held (`steady`), at any time (`pushed`),
+    and due to changes of target, momentum and the external torque that the law knows (`stale`): in the mean, and twice that
+    at any time. `uneven` is `steady` without the linear effect of errors that noise drives. `bent` bounds the slopes of the
+    gyroscopic acceleration in the rates; `late`: the late torque's error; `end`: the drift of the rates at the end, while
+    `drift` is that of a motion that drifts evenly and has at least the same effect."""
 
     region: Region
     sizes: Sizes
@@ -84,13 +84,13 @@ class Tube:
 
     @property
     def push(self) -> Fraction:
-        """Return the bound of all together but what is late, in the mean."""
+        """Return the bound of all of these together, except for the late torque, in the mean."""
         return self.steady + self.pushed + self.stale
 
 
 def factored(p: Poly) -> Factored:
-    """Return what two factors of x, the last of every monomial, leave of a polynomial, by their places: sizes of what is
-    even but for powers of q0, where it is added and where it is subtracted, and of the rest."""
+    """Return the cofactors of a polynomial by the places of two factors of x, the last of every monomial: bounds of those
+    that are even but for powers of q0, with positive and with negative sign, and of the rest."""
     place, parts = {name: k for k, name in enumerate(STATE)}, dict[tuple[int, int], tuple[dict[Monomial, int], ...]]()
     for m, c in p.upper.items():
         factors = sorted((name for name in m if name != "q0"), key=place.__contains__)
@@ -103,14 +103,14 @@ def factored(p: Poly) -> Factored:
 
 
 def least_form(parts: Factored, region: Region) -> Rows:
-    """Return the matrix of a form that a polynomial is not below: what two factors of x leave of it lies in an interval, and
-    |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
+    """Return the matrix of a quadratic form that bounds a polynomial from below: the cofactor of x_i x_k lies in an
+    interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
     sizes, middle, radius = region.sizes, scalar(0, 6), scalar(0, 6)
     for (i, k), (more, less, uneven) in parts.items():
         if region.least < 0:
             uneven = total([uneven, *(part.only(lambda m: "q0" in m) for part in (more, less))])
             more, less = (part.only(lambda m: "q0" not in m) for part in (more, less))
-        # Without another factor than q0 it is at least what it is at the least of that.
+        # A cofactor in q0 alone is at least its value at the least q0.
         least = [part.only(lambda m: {*m} <= {"q0"}).at({"q0": region.least}).number for part in (more, less)]
         high, low, spread = (most(part, sizes) for part in (more, less, uneven))
         above, below = high - least[1] + spread, low - least[0] + spread
@@ -132,9 +132,9 @@ def outweighed(Q: Rows, c: Fraction, F: Rows, M: Rows) -> Rows:
 
 
 def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
-    """Return how much parts change at most with a vector, in norms: not at all with one that none of them has."""
+    """Return a bound, in norms, of how much expressions change with a vector; zero for one that occurs in none of them."""
     names = [name for name in sizes if name[0] == letter]
-    demand(all(name in names for p in parts for name in p.names if name[0] == letter), "how large a vector is is not told")
+    demand(all(name in names for p in parts for name in p.names if name[0] == letter), "the size of a vector is not stated")
     if not names:
         return Fraction(0)
     rows, turned = taken_apart(tuple(tuple(p.slope(name) for name in names) for p in parts))
@@ -146,8 +146,8 @@ def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
 
 @lru_cache(256)
 def taken_apart(rows: tuple[tuple[Poly, ...], ...]) -> tuple[tuple[tuple[Poly, ...], ...], list[tuple[str, Fraction]]]:
-    """Return what is left of a matrix of polynomials without those of y x z, and how often each y is in it: |y x z| <= |y|
-    |z|, and the rest is bounded by its entries. Vectors from outside are no longer than each of their components may be."""
+    """Return a matrix of polynomials without its terms c y x z, and c for each y: |y x z| <= |y| |z|, and the rest is
+    bounded by its entries. No external vector is longer than the bound of each of its components."""
     turned = list[tuple[str, Fraction]]()
     for letter in "wrah" if len(rows) == len(rows[0]) == 3 else "":
         names = [f"{letter}{k + 1}" for k in AXES]
@@ -162,7 +162,7 @@ def taken_apart(rows: tuple[tuple[Poly, ...], ...]) -> tuple[tuple[tuple[Poly, .
 
 
 def as_told(true: Sizes, wrong: Sizes) -> Sizes:
-    """Return the sizes of what a law is told that is off by so much, by letters."""
+    """Return the sizes of the law's inputs for errors of these sizes, by letter."""
     return {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in true.items()}
 
 
@@ -173,12 +173,12 @@ def lengths(X: Rows) -> Sizes:
 
 
 def widened(X: Rows, swayed: Radii) -> Rows:
-    """Return the matrix of an ellipsoid that holds all that is no further than `swayed` from another one."""
+    """Return the matrix of an ellipsoid that contains everything within `swayed` of another one."""
     return plus([[2 * x for x in row] for row in X], balls(swayed), 4) if any(swayed) else X
 
 
 def balls(radii: Radii) -> Rows:
-    """Return the matrix of which the parts are those of balls of w and q, with these radii."""
+    """Return the matrix whose blocks are those of balls of w and q with these radii."""
     return [[radii[i // 3] ** 2 * (i == k) for k in range(6)] for i in range(6)]
 
 
@@ -188,12 +188,12 @@ def first(p: Poly, letter: str) -> Poly:
 
 
 def with_momentum(p: Poly, rate: str = "w") -> Poly:
-    """Return what of a polynomial is a product of wheels' momentum and a rate, the body's or the target's."""
+    """Return the terms of a polynomial that are products of wheels' momentum and a rate, the body's or the target's."""
     return p.only(lambda m: [name[0] for name in m] == sorted(("h", rate)))
 
 
 def growing(parts: list[Poly]) -> list[Poly]:
-    """Return what of polynomials vanishes with the state."""
+    """Return the terms of polynomials that vanish with the state."""
     return [p.only(lambda m: not set(STATE).isdisjoint(m)) for p in parts]
 
 
@@ -203,12 +203,12 @@ def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
 
 
 def beyond(wide: list[Fraction], sizes: Sizes) -> list[Fraction]:
-    """Return by how much bounds of the rates are more than those in a region."""
+    """Return by how much bounds of the rates exceed those in a region."""
     return [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
 
 
 def stretch(rows: Rows) -> Fraction:
-    """Return a bound of how much longer a matrix makes a vector: of the sums of its rows and of its columns, or of all."""
+    """Return a bound of the norm of a matrix: by the sums of its rows and of its columns, or by all entries."""
     numbers, below = whole([abs(x) for row in rows for x in row])
     lines = [numbers[k : k + len(rows[0])] for k in range(0, len(numbers), len(rows[0]))]
     across, down = max(map(sum, lines)), max(map(sum, zip(*lines, strict=True)))
@@ -216,7 +216,7 @@ def stretch(rows: Rows) -> Fraction:
 
 
 def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:
-    """Return bounds that a monotone change leaves bounds: what begins within them at no time leaves them."""
+    """Return bounds that a monotone map maps into themselves: motions that begin within them never leave them."""
     bounds = begun or [Fraction(0)] * 3
     for _ in range(ITERATIONS):
         further = change(bounds)

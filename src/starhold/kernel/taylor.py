@@ -1,9 +1,9 @@
-"""Programs read over Taylor models: polynomials of low degree in the inputs, each on a box, and how far programs are from
-them there at most.
+"""Programs evaluated over Taylor models: polynomials of low degree in the inputs, each on a box, with bounds of how far
+programs are from them there.
 
-An input is its size times a number of no more than 1 in size, in which polynomials are: none is larger than the sum of its
-coefficients' sizes. Those are whole multiples of 2^-PLACES, and what is rounded or left out goes to the radius. A condition
-has to be decided on the whole box, so that a program is one smooth function there. Docs/kernel.md, 12.
+An input is its bound times a number between -1 and 1, and polynomials are in these numbers: none exceeds the sum of its
+coefficients' sizes. Coefficients are whole multiples of 2^-PLACES; rounding errors and omitted terms go to the radius. A
+condition has to be decided on the whole box, so that a program is one smooth function there. Docs/kernel.md, 12.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ Terms: TypeAlias = dict[int, int]
 
 
 class Model(NamedTuple):
-    """A polynomial, by degrees, and a radius: what it is a model of is no further from it on the box."""
+    """A polynomial, by degrees, and a radius: the modelled function is within that distance of the polynomial on the box."""
 
     parts: tuple[Terms, ...]
     radius: int
 
     @property
     def sizes(self) -> list[int]:
-        """Return the sizes of the polynomial's parts."""
+        """Return bounds of the polynomial's parts, by degrees."""
         return [sum(map(abs, part.values())) for part in self.parts]
 
     @property
@@ -42,7 +42,7 @@ class Model(NamedTuple):
 
     @property
     def spread(self) -> int:
-        """Return how far values on the box are from that at most."""
+        """Return the largest distance of the function, on the box, from the polynomial's value at zero."""
         return sum(self.sizes[1:]) + self.radius
 
 
@@ -56,12 +56,12 @@ def number(x: Fraction) -> Model:
 
 
 def multiple(size: Fraction) -> int:
-    """Return the least multiple that is not below a size."""
+    """Return the least multiple not below a size."""
     return -((-size.numerator << PLACES) // size.denominator)
 
 
 def within(size: Fraction, place: int) -> Model:
-    """Return the input of a place, which is no larger than told."""
+    """Return the input in a place, with this bound."""
     return Model(({}, {1 << BITS * place: multiple(size)}, *[{}] * (DEGREE - 1)), 0)
 
 
@@ -87,7 +87,7 @@ def subtract(x: Model, y: Model) -> Model:
 
 
 def multiply(x: Model, y: Model) -> Model:
-    """Return a product, without what is of a higher degree."""
+    """Return a product; terms of higher degree go to the radius."""
     for a, b in ((x, y), (y, x)):
         if not a.radius and not any(a.parts[1:]):
             return multiplied(b, a.constant)
@@ -100,14 +100,14 @@ def multiply(x: Model, y: Model) -> Model:
                     product[m + n] = product.get(m + n, 0) + c * d
         rounded += sum(c & (ONE - 1) > 0 for c in product.values())
         parts.append({m: c >> PLACES for m, c in product.items()})
-    # A model is no further from zero than its parts and radius, and a coefficient is rounded by less than one.
+    # A model's size is at most that of its parts and its radius, and rounding changes a coefficient by less than one.
     higher = sum(a * b for i, a in enumerate(left) for k, b in enumerate(right) if i + k > DEGREE)
     apart = higher + x.radius * (sum(right) + y.radius) + sum(left) * y.radius
     return Model(tuple(parts), -(-apart >> PLACES) + rounded)
 
 
 def multiplied(x: Model, c: int) -> Model:
-    """Return a model times so many multiples."""
+    """Return a model times a number of multiples."""
     products = [{m: c * d for m, d in part.items()} if c else {} for part in x.parts]
     rounded = sum(d & (ONE - 1) > 0 for part in products for d in part.values())
     parts = tuple({m: d >> PLACES for m, d in part.items()} for part in products)
@@ -115,7 +115,7 @@ def multiplied(x: Model, c: int) -> Model:
 
 
 def series(x: Model, coefficients: Sequence[Fraction], rest: Fraction) -> Model:
-    """Return a polynomial of what is without a constant, and no more than `rest` beside."""
+    """Return a polynomial of a model without a constant, with an error of at most `rest`."""
     value = number(coefficients[-1])
     for c in coefficients[-2::-1]:
         value = add(multiply(value, x), number(c))
@@ -123,7 +123,7 @@ def series(x: Model, coefficients: Sequence[Fraction], rest: Fraction) -> Model:
 
 
 def relative(y: Model) -> tuple[Fraction, Model, Fraction]:
-    """Return a constant, what a model is beside it as a multiple of it, and how large that is; it is less than 1."""
+    """Return a model's constant, the remaining model relative to it, and the size of that, which is less than 1."""
     demand(y.spread < abs(y.constant), "a program divides by what may be zero, or takes a root of it")
     c = Fraction(y.constant, ONE)
     beside = multiply(add(y, number(-c)), number(1 / c))
@@ -145,7 +145,7 @@ def divide(x: Model, y: Model) -> Model:
 
 
 def root(y: Model) -> Model:
-    """Return the root of what is positive: (1 + x)^(1/2) = 1 + x/2 - x^2/8 + ..., with ever smaller coefficients."""
+    """Return the root of a positive model: (1 + x)^(1/2) = 1 + x/2 - x^2/8 + ..., with ever smaller coefficients."""
     c, x, size = relative(y)
     demand(c > 0, "a program takes a root of what is negative")
     terms = [Fraction(1)]
@@ -167,7 +167,7 @@ def is_less(x: Model, y: Model, strictly: bool = True) -> bool:
 
 
 def select(truth: bool, x: Model, y: Model) -> Model:
-    """Return what a condition chooses, which is decided."""
+    """Return the value chosen by a condition that is decided."""
     return x if truth else y
 
 
@@ -188,7 +188,7 @@ OPERATIONS: dict[str, Callable[..., Value]] = {
 
 
 def run(program: Program, given: Mapping[str, Model], count: int) -> list[Model]:
-    """Return models of a program's outputs, of which there have to be so many."""
+    """Return models of a program's outputs, which must be so many."""
     demand(len(program.outputs) == count, f"a program has {len(program.outputs)} outputs and not {count}")
     demand(all(name in given for name in program.inputs), "a program asks for what nothing gives")
     values: list[Any] = [given[name] for name in program.inputs]
@@ -201,7 +201,7 @@ def run(program: Program, given: Mapping[str, Model], count: int) -> list[Model]
         work = sum(map(sum, models))
         if operation in ("product", "divide", "sqrt"):
             pairs = sum(a * b for i, a in enumerate(models[0]) for b in models[-1][: DEGREE + 1 - i])
-            # A quotient or root is a few products of what may have all terms.
+            # A quotient or root takes a few products of models in which all terms may occur.
             work += pairs if operation == "product" else 12 * sum(models[-1]) ** 2
         Account.spend(8 + work, PLACES)
         values.append(OPERATIONS[operation](*chosen))
@@ -209,12 +209,12 @@ def run(program: Program, given: Mapping[str, Model], count: int) -> list[Model]
 
 
 def slope(model: Model, size: Fraction, place: int) -> Fraction:
-    """Return the slope at zero in the input of a place, about."""
+    """Return the approximate slope at zero in the input of a place."""
     return Fraction(model.parts[1].get(1 << BITS * place, 0), multiple(size))
 
 
 def beyond(model: Model, sizes: Sequence[Fraction], row: Sequence[Fraction]) -> tuple[list[Fraction], Fraction]:
-    """Return D and c: on the box of these sizes a model is no further than D.|z| + c from row.z. A monomial is shared among
+    """Return D and c: on the box of these sizes a model differs from row.z by at most D.|z| + c. A monomial is shared among
     its inputs; none of them exceeds its size."""
     wide = [Fraction(multiple(size), ONE) for size in sizes]
     shares = [abs(slope(model, x, k) - entry) * x for k, (x, entry) in enumerate(zip(wide, row, strict=True))]

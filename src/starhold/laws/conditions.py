@@ -194,20 +194,8 @@ def _away_from_sun(now: Facts, settings: Mapping[str, Any]) -> Scalar:
 TESTED: Mapping[str, Tested] = {
     "rate": Tested("rad/s", "the rate relative to the target", _rate, watched=False),
     "body_rate": Tested("rad/s", "the absolute rate", _body_rate, watched=False),
-    "angle": Tested(
-        "rad",
-        "the angle to the target",
-        _angle,
-        sine_of_half,
-        most=3.141592653589793,
-        watched=False,
-    ),
-    "wheel_momentum": Tested(
-        "N m s",
-        "the norm of the wheels' momentum",
-        _wheel_momentum,
-        watched=False,
-    ),
+    "angle": Tested("rad", "the angle to the target", _angle, sine_of_half, most=3.141592653589793, watched=False),
+    "wheel_momentum": Tested("N m s", "the norm of the wheels' momentum", _wheel_momentum, watched=False),
     "elevation": Tested(
         "rad",
         "the elevation at which the station at this latitude and longitude sees the craft",
@@ -219,12 +207,7 @@ TESTED: Mapping[str, Tested] = {
         sky=True,
     ),
     "sunlight": Tested(
-        "1",
-        "the share of the Sun's disc that the Earth leaves in view",
-        _sunlight,
-        least=0.01,
-        most=0.99,
-        sky=True,
+        "1", "the share of the Sun's disc that the Earth leaves in view", _sunlight, least=0.01, most=0.99, sky=True
     ),
     "sun_angle": Tested(
         "rad",
@@ -237,10 +220,7 @@ TESTED: Mapping[str, Tested] = {
         sky=True,
     ),
     "tracker_age": Tested(
-        "s",
-        "the time since the last new attitude of a star tracker",
-        _tracker_age,
-        reads="attitude_is_new",
+        "s", "the time since the last new attitude of a star tracker", _tracker_age, reads="attitude_is_new"
     ),
     "attitude_deviation": Tested(
         "rad",

@@ -1,8 +1,7 @@
-"""Among all controls within the limit, chooses the one under which a given V decreases fastest. V compares the velocity
-with one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with f1 = y^2 + z^2 - radius^2. With
-pull = 0 it would be the V of `l2-circle`, and full control would hold any circle near the intended one, because there that
-V is constant for every control.
-"""
+"""Among all controls within the limit, chooses the one under which a given V decreases fastest. V compares the velocity with
+one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with f1 = y^2 + z^2 - radius^2. With pull
+= 0 it would be the V of `l2-circle`, and full control would hold any circle near the intended one, because there that V is
+constant for every control."""
 
 from __future__ import annotations
 

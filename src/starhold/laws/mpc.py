@@ -54,8 +54,7 @@ class Gains(NamedTuple):
 
 CALLS, SWEEPS, WORST, EXHAUSTED, SHAPED = range(COUNTERS)
 """Indices of the counters: calls, total Riccati sweeps, most sweeps in a call, calls that used up the budget without
-reaching the optimum, and whether limits were active in the last plan (1, else 0), which decides how the next call
-starts."""
+reaching the optimum, and whether limits were active in the last plan (1, else 0), which decides how the next call starts."""
 
 
 class Memory(NamedTuple):

@@ -47,9 +47,8 @@ class Gains(NamedTuple):
 
 class Layered(NamedTuple):
     """The form takes the natural frequency and damping ratio of the linear loop in a boundary layer, which has two real
-    roots, those of the surface and of the layer. It is exact about every axis for a diagonal inertia, whose reaching
-    torques are in proportion to the moments; else exact about the axis of the largest moment, and faster about the
-    others."""
+    roots, those of the surface and of the layer. It is exact about every axis for a diagonal inertia, whose reaching torques
+    are in proportion to the moments; else exact about the axis of the largest moment, and faster about the others."""
 
     bandwidth: Annotated[float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="lowest natural frequency of all axes")]
     switching_gain: Annotated[float, Gain("N m", above=0.0, text="switching torque about the axis of the largest moment")]

@@ -24,10 +24,7 @@ Listen: TypeAlias = Callable[["Line"], Coroutine[Any, Any, tuple[str, Callable[[
 
 
 def serve(
-    plant: Plant,
-    listen: Listen,
-    announce: Callable[[str], None] | None = None,
-    watch: Callable[[Plant], None] | None = None,
+    plant: Plant, listen: Listen, announce: Callable[[str], None] | None = None, watch: Callable[[Plant], None] | None = None
 ) -> int:
     """Listen until the plant's flight ends, and return the number of the signal that ended it, 0 for none.
 

@@ -25,8 +25,7 @@ ON_TARGET = Fitted(find("target", "inertial"), Inertial())
 
 class Setup(NamedTuple):
     """The numbers of a loop besides those of craft and law, an argument of kernels. Those of parts are in the order of the
-    loop; limit: the saturation limit of the command; divergence_bound: the distance beyond which the motion has
-    diverged."""
+    loop; limit: the saturation limit of the command; divergence_bound: the distance beyond which the motion has diverged."""
 
     period: float
     substep: float

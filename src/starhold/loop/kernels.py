@@ -189,8 +189,7 @@ def make_program(kind: Callable[..., Program], parts: Composition, *arguments: A
 def make_kernel(
     kind: Callable[..., Program], parts: Composition, width: int, *arguments: Any, passes: bool | None = None
 ) -> Kernel:
-    """Return the kernel of a program kind(step, *arguments), compiled once for arguments of one form. passes: see
-    `load`."""
+    """Return the kernel of a program kind(step, *arguments), compiled once for arguments of one form. passes: see `load`."""
     key = (kind, parts, width, passes, form(arguments))
     if key not in _KERNELS:
         _KERNELS[key] = Kernel(make_program(kind, parts, *arguments), width, passes)

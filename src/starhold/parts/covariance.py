@@ -25,11 +25,7 @@ def carried(turn: Matrix, mixed: Matrix, walk: Matrix, axes: Matrix, drift: Matr
 
 def along_diagonal(a: Matrix, number: Scalar) -> Matrix:
     """Return a + number times the identity."""
-    return (
-        (a[0][0] + number, a[0][1], a[0][2]),
-        (a[1][0], a[1][1] + number, a[1][2]),
-        (a[2][0], a[2][1], a[2][2] + number),
-    )
+    return ((a[0][0] + number, a[0][1], a[0][2]), (a[1][0], a[1][1] + number, a[1][2]), (a[2][0], a[2][1], a[2][2] + number))
 
 
 def summed(a: Matrix, b: Matrix) -> Matrix:

@@ -11,19 +11,7 @@ from starhold.algebra.quaternion import Quaternion, multiply, renormalise
 from starhold.algebra.rotation import short_turn
 from starhold.algebra.scalar import Scalar, Truth
 from starhold.algebra.structure import chosen
-from starhold.algebra.vector import (
-    IDENTITY,
-    ZERO,
-    Matrix,
-    Vector,
-    add,
-    apply,
-    combine,
-    inverse,
-    scale,
-    subtract,
-    transpose,
-)
+from starhold.algebra.vector import IDENTITY, ZERO, Matrix, Vector, add, apply, combine, inverse, scale, subtract, transpose
 from starhold.algebra.vector import multiply as product
 from starhold.parts.attitudes import small_turn, turned_by
 from starhold.parts.covariance import along_diagonal, carried, summed, symmetric
@@ -83,8 +71,7 @@ class Gains(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """The gains for the residual of an attitude, which give the new covariances; those for the actual residual, and
-    this."""
+    """The gains for the residual of an attitude, which give the new covariances; those for the actual residual, and this."""
 
     whole: Gains
     gain: Gains

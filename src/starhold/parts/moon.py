@@ -81,8 +81,4 @@ def position(time: Scalar, params: Numbers) -> Vector:
     # Angles of about a degree equal their sines to 5e-5.
     distance = EARTH / (radians(1.0) * parallax)
     x, y = distance * (level * x), level * y
-    return (
-        x,
-        distance * (params.cosine * y - params.sine * north),
-        distance * (params.sine * y + params.cosine * north),
-    )
+    return (x, distance * (params.cosine * y - params.sine * north), distance * (params.sine * y + params.cosine * north))

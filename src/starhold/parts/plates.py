@@ -85,10 +85,7 @@ def _product(factor: Scalar, number: Scalar) -> Scalar:
 
 
 def largest_torque(
-    normals: Sequence[Vector],
-    taken: Sequence[Vector],
-    mirrored: Sequence[Vector] = (),
-    scattered: Sequence[Vector] = (),
+    normals: Sequence[Vector], taken: Sequence[Vector], mirrored: Sequence[Vector] = (), scattered: Sequence[Vector] = ()
 ) -> float:
     """Return a bound (m3) on |s x sum c_i taken_i - sum c_i^2 mirrored_i - sum c_i scattered_i| over all unit vectors s,
     with c_i = max(n_i.s, 0).

@@ -184,7 +184,7 @@ def _provided(verdicts: list[Verdict]) -> str:
 
 
 def _met(verdicts: list[Verdict], words: Wording) -> str:
-    what = f"meets {_all(len(verdicts))}"
+    what = "meets what is required" if len(verdicts) == 1 else f"meets all {len(verdicts)} requirements"
     shares = listed([f"at least {percent(verdict.share)} {_keep(verdict, words)}" for verdict in verdicts])
     return f"{what}: of all flights {shares}, shown with {_confidences(verdicts)}, {_provided(verdicts)}"
 
@@ -229,10 +229,6 @@ def _keep(verdict: Verdict, words: Wording) -> str:
 
 def _miss(verdict: Verdict, words: Wording) -> str:
     return "are lost" if words.is_loss(verdict.name) else f"miss {verdict.name}"
-
-
-def _all(count: int) -> str:
-    return "what is required" if count == 1 else f"all {count} requirements"
 
 
 def _some(count: int, total: int) -> str:

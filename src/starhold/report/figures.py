@@ -180,8 +180,7 @@ def headed(
     height: float, title: str, flights: Sequence[Flight], name: str, dashed: str, gap: float
 ) -> tuple[Any, float, float]:
     """Return a figure with its title and legend, its height (inches), and the top of its axes, `gap` (inches) below the
-    legend. Distances are fixed, because layout engines draw everything twice.
-    """
+    legend. Distances are fixed, because layout engines draw everything twice."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 

@@ -16,16 +16,7 @@ from starhold.certification.assumptions import standing
 from starhold.laws.interface import Gain
 from starhold.report.answer import columns_list, facts, key_metrics, lost_alarm, proofs, ranking, verdicts
 from starhold.report.body import report_of
-from starhold.report.page_parts import (
-    beside,
-    document,
-    fold,
-    law_data,
-    laws_table,
-    plot_box,
-    transient_switch,
-    versions,
-)
+from starhold.report.page_parts import beside, document, fold, law_data, laws_table, plot_box, transient_switch, versions
 from starhold.report.plots import colour
 from starhold.report.proved import section as proved
 from starhold.report.settings import settings, with_units

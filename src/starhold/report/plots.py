@@ -104,8 +104,7 @@ def thinning(count: int, points: int) -> int:
 
 def thin(values: Curve, factor: int) -> Curve:
     """Return two of every `factor` samples, to be drawn over `thin_times`. Where omitted samples exceed those kept, the
-    minimum and maximum replace them, so chatter keeps its amplitude and shifts by less than `factor` periods.
-    """
+    minimum and maximum replace them, so chatter keeps its amplitude and shifts by less than `factor` periods."""
     if factor == 1 or not len(values):
         return values
     groups = np.pad(values, (0, -len(values) % factor), mode="edge").reshape(-1, factor)

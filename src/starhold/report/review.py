@@ -343,8 +343,4 @@ def _credibility(review: Review) -> Iterator[Piece]:
     rows = [[name, " ".join(known) or "nothing", " ".join(blank)] for name, (known, blank) in factors.items()]
     yield _table("factor|known|not stated", rows)
     for name, (_, blanks) in factors.items():
-        yield from (Listed(f"{name}: not stated: {_lower(blank)}") for blank in blanks)
-
-
-def _lower(text: str) -> str:
-    return f"{text[:1].lower()}{text[1:]}"
+        yield from (Listed(f"{name}: not stated: {blank[:1].lower()}{blank[1:]}") for blank in blanks)

@@ -1,8 +1,7 @@
 """The interface of distributions. Each maps uniform numbers to values, so random, Sobol and Latin hypercube samples work
-with all of them. Parameters stay as in the file until `read` replaces them by numbers in the key's unit.
-Every `draw` takes uniforms u (dims, n) strictly between 0 and 1 and returns values (width, n). Each value depends, to the
-last bit, only on its own column of u, so a campaign may be split into chunks anywhere.
-"""
+with all of them. Parameters stay as in the file until `read` replaces them by numbers in the key's unit. Every `draw` takes
+uniforms u (dims, n) strictly between 0 and 1 and returns values (width, n). Each value depends, to the last bit, only on its
+own column of u, so a campaign may be split into chunks anywhere."""
 
 from __future__ import annotations
 
@@ -39,8 +38,7 @@ class Distribution(Table):
     """Whether values have bounds, whatever the parameters are."""
 
     judged_apart: Annotated[
-        Flag,
-        Field(description="known before flight, such as the launch date: runs of similar values are judged separately"),
+        Flag, Field(description="known before flight, such as the launch date: runs of similar values are judged separately")
     ] = False
     known_to_law: Annotated[
         Flag, Field(description="whether laws know and are designed for the drawn value, not the file's")

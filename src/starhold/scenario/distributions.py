@@ -1,6 +1,5 @@
 """The distributions of dispersed numbers. Each class is one distribution: its table in a file, the conversion of its
-parameters, and its inverse distribution function. Its field `distribution` gives its name; no other code names it.
-"""
+parameters, and its inverse distribution function. Its field `distribution` gives its name; no other code names it."""
 
 from __future__ import annotations
 
@@ -92,9 +91,8 @@ class TruncatedNormal(Spread):
 
     @cached_property
     def _tails(self) -> tuple[NDArray[np.bool_], Array, Array]:
-        """For each component, whether its interval is reflected about the mean, and the probabilities below its two
-        ends after that. In the upper tail these are too close to one, so an interval there is reflected to the lower
-        tail."""
+        """For each component, whether its interval is reflected about the mean, and the probabilities below its two ends
+        after that. In the upper tail these are too close to one, so an interval there is reflected to the lower tail."""
         from scipy.special import ndtr
 
         mean, sigma, low, high = (column(numbers) for numbers in (self.mean, self.sigma, self.low, self.high))

@@ -126,8 +126,7 @@ class Orbit(Table):
     tle: Annotated[Any, *_file("two lines (TLE)")] = None
     omm: Annotated[Any, *_file("an orbit mean-elements message (OMM)")] = None
     oem: Annotated[
-        Any,
-        *_file("an orbit ephemeris message (OEM)", "it gives the state at the epoch, by default its first"),
+        Any, *_file("an orbit ephemeris message (OEM)", "it gives the state at the epoch, by default its first")
     ] = None
 
     @property

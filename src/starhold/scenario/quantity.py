@@ -108,13 +108,9 @@ def reader(gain: Gain) -> Callable[..., Any]:
             _check_size(checked)
             return checked
         except (ValueError, OverflowError) as error:
-            raise refuse(_plain(error)) from None
+            raise refuse(" ".join(str(error).split())) from None
 
     return read
-
-
-def _plain(error: Exception) -> str:
-    return " ".join(str(error).split())
 
 
 def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:

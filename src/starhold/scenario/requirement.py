@@ -1,6 +1,5 @@
 """The [[requirement]] tables of a scenario: requirements on a flight and their methods of verification. Limits are in the
-unit of their metric, so they stay as in the file; `studies.requirements` converts them.
-"""
+unit of their metric, so they stay as in the file; `studies.requirements` converts them."""
 
 from __future__ import annotations
 

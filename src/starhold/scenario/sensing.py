@@ -2,6 +2,7 @@
 
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import IS_VALID
 from starhold.parts.part import Fitted
 
 
@@ -15,6 +16,8 @@ def check_sensors(loop: ClosedLoop, where: str) -> set[str]:
     sensors: dict[str, list[str]] = {}
     for sensor in loop.used("sensor"):
         for name in sensor.part.module.Reading._fields:
+            if name == IS_VALID:
+                raise InputError(where, f"part {sensor.called}", f"a reading {name}", "another name: estimators state it")
             if name in sensors and name in single:
                 given = f"a second sensor of {name}, beside {sensors[name][0]}"
                 raise InputError(where, f"part {sensor.called}", given, "one of each, or an estimator that fuses them all")

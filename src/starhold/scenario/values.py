@@ -1,6 +1,5 @@
 """The values of a scenario's keys, and conversion of other values to their units. Keys are written as for `Scenario.with_`.
-Values are validated numbers, SI or scaled, like plain numbers in the file.
-"""
+Values are validated numbers, SI or scaled, like plain numbers in the file."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

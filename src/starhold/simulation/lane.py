@@ -220,9 +220,8 @@ def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
 
 
 def _room(steps: int, record_every: int, width: int) -> NDArray[np.float64]:
-    """Return the storage of a run's samples, a row each: memory or, for many samples, an unnamed file that the system
-    caches as memory allows. Raise InputError if the disk is too small for that file, or memory for metrics of the
-    samples."""
+    """Return the storage of a run's samples, a row each: memory or, for many samples, an unnamed file that the system caches
+    as memory allows. Raise InputError if the disk is too small for that file, or memory for metrics of the samples."""
     count = steps // record_every + 1
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 2**33
     # Computing metrics needs a dozen numbers per sample at a time.

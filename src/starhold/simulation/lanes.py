@@ -281,8 +281,7 @@ def _differ(loop: ClosedLoop) -> bool:
 
 def stacked(values: Sequence[Any]) -> Any:
     """Return the structures of many lanes stacked into one: numbers that differ become arrays (lanes,). Raise ValueError if
-    more than numbers differ: the form, integers, tables.
-    """
+    more than numbers differ: the form, integers, tables."""
     first = values[0]
     if isinstance(first, (tuple, list)):
         if any(type(value) is not type(first) or len(value) != len(first) for value in values):

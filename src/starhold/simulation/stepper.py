@@ -69,9 +69,8 @@ def _shaped(numbers: NDArray[np.float64], like: Any) -> Any:
 
 
 class Stepper:
-    """One flight of a closed loop, or many at once, one control step per call. A flight with commands of its own law has
-    the bits of `simulate`.
-    """
+    """One flight of a closed loop, or many at once, one control step per call. A flight with commands of its own law has the
+    bits of `simulate`."""
 
     def __init__(self, loop: ClosedLoop, lanes: int | None = None, record: bool = True) -> None:
         """lanes: the number of flights, None for one flight without an axis of lanes; record: whether samples are kept."""
@@ -87,8 +86,7 @@ class Stepper:
     def reset(self, seed: int | None = None, run: int | None = None, start: Any = None) -> Readings:
         """Begin again, and return the initial readings. seed, run: of the random numbers, the scenario's if None; many
         flights have the runs from `run` on; start: another state of the body, like `state`, whose numbers may be arrays
-        (lanes,). Raise ValueError for another shape and for numbers that are not finite.
-        """
+        (lanes,). Raise ValueError for another shape and for numbers that are not finite."""
         loop, lanes = self.loop, self.lanes or 1
         self.seed, self.run = loop.seed if seed is None else seed, loop.run if run is None else run
         given = flatten(loop.start if start is None else start)
@@ -144,10 +142,9 @@ class Stepper:
         return self._read("carry")[self._batch.rows.lost_at] >= 0.0
 
     def step(self, command: ArrayLike | None = None) -> Readings:
-        """Fly one control period, and return the readings at its end. command: held over the period, (3,) or (lanes, 3),
-        and saturated like the law's own (N m, or the body's unit); None: the command of the loop's own law. Raise
-        ValueError for a command that is not finite or of another shape.
-        """
+        """Fly one control period, and return the readings at its end. command: held over the period, (3,) or (lanes, 3), and
+        saturated like the law's own (N m, or the body's unit); None: the command of the loop's own law. Raise ValueError for
+        a command that is not finite or of another shape."""
         if command is not None:
             wanted = np.asarray(command, dtype=float)
             shape = (3,) if self.lanes is None else (self.lanes, 3)

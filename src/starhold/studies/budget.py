@@ -167,8 +167,7 @@ def study(
     """Return the pointing error budget of a law of a scenario, from flights without any error source, with each source
     alone, and with all of them, always without faults. A source's contribution is the difference, run by run and instant by
     instant, between the errors with this source and without any. `notice` is called with the number done, the total, and the
-    next flight. InputError where nothing disturbs the loop, the windows do not fit into the run, or a motion diverges.
-    """
+    next flight. InputError where nothing disturbs the loop, the windows do not fit into the run, or a motion diverges."""
     required = {one.metric.upper(): one.bound for one in check_budget(scenario)}
     scenario = faultless(scenario)
     disturbing, clock = sources(scenario), _Clock.of(scenario)

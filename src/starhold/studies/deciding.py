@@ -15,14 +15,7 @@ from starhold.scenario.checking import show
 from starhold.studies.body import study_of
 from starhold.studies.budget import TOGETHER
 from starhold.studies.requirements import Requirement, at_most, read_requirements, tables_of, times_of
-from starhold.studies.verification import (
-    RequirementVerdict,
-    check_modes,
-    compared,
-    limits,
-    mode_names,
-    undecided,
-)
+from starhold.studies.verification import RequirementVerdict, check_modes, compared, limits, mode_names, undecided
 
 if TYPE_CHECKING:
     from starhold.analysis.linear import Linear
@@ -132,7 +125,9 @@ def _proved(
         # A requirement without an end covers the flight, or the time after it where it begins there.
         until = times.end if math.isfinite(times.end) else max(scenario.table.simulation.duration, times.begin)
         grown = _grown(one, claim, until)
-        unloaded = bool(grown) and any(_unloads(fitted.part) for fitted in one.loop.used("effector"))
+        # An effector unloads the wheels by an external torque, and does not take the command.
+        effectors = [fitted.part for fitted in one.loop.used("effector") if grown]
+        unloaded = any(x.flag("OUTSIDE") and not x.flag("ACTS") and "wheels" in x.needs for x in effectors)
         limited = claim.limited_to(until)
         why = why or ("" if unloaded else grown) or (f"the claim holds only if {limited}" if limited else "")
         if why:
@@ -152,20 +147,14 @@ def _proved(
             )
         evidence = f"proved: {said}"
         verdict = compared(table, required, most, evidence, left_out=tuple(absent))
-        verdicts.append(verdict if verdict.verdict == "met" else _open(table, required, verdict))
+        if verdict.verdict != "met":
+            # A bound beyond the limit does not decide about the number itself.
+            why = f"only this bound is {verdict.evidence}"
+            verdict = undecided(table, why, number=verdict.number, **limits(table, required))
+        verdicts.append(verdict)
     return min(verdicts, key=lambda one: (one.verdict != "met", len(one.left_out)), default=None) or undecided(
         table, why, **limits(table, required)
     )
-
-
-def _open(table: RequirementTable, required: Requirement, verdict: RequirementVerdict) -> RequirementVerdict:
-    """Return the verdict "not decided" for a bound beyond the limit, which does not decide about the number itself."""
-    return undecided(table, f"only this bound is {verdict.evidence}", number=verdict.number, **limits(table, required))
-
-
-def _unloads(part: Any) -> bool:
-    """Return whether an effector unloads the wheels by an external torque and does not take the command."""
-    return part.flag("OUTSIDE") and not part.flag("ACTS") and "wheels" in part.needs
 
 
 def _grown(one: Issued, claim: Claim, until: float) -> str:

@@ -55,15 +55,14 @@ class Saturation:
 @dataclass(frozen=True)
 class Failure:
     """A loss of wheels, and the control authority after it. Values that need three axes are None where fewer are left. lost:
-    the lost wheels, counted from 1; empty for the intact set. lacking: body directions without authority, orthonormal
-    (n, 3). condition: condition number of the working axes. authority: N m. share: authority relative to the intact set.
-    gains: those that fly, by field. eta: degree of stability (1/s), intact and after the loss; None for a law not designed
-    for one. settling: s, None where the motion does not settle within the scenario's duration. diverged_at: s, None where
-    the motion does not diverge. certified: the largest slew from rest (rad) and the largest rate on target (rad/s) for which
-    it is proved that no motor and no wheel reaches its limit; None where this is not proved. momentum_share: largest |h|
-    over its limit among working wheels during the flight. flown: length of the flight (s). orbit: orbital period (s), None
-    without an orbit. refused: why the law cannot fly with the remaining wheels; then there is no flight.
-    """
+    the lost wheels, counted from 1; empty for the intact set. lacking: body directions without authority, orthonormal (n,
+    3). condition: condition number of the working axes. authority: N m. share: authority relative to the intact set. gains:
+    those that fly, by field. eta: degree of stability (1/s), intact and after the loss; None for a law not designed for one.
+    settling: s, None where the motion does not settle within the scenario's duration. diverged_at: s, None where the motion
+    does not diverge. certified: the largest slew from rest (rad) and the largest rate on target (rad/s) for which it is
+    proved that no motor and no wheel reaches its limit; None where this is not proved. momentum_share: largest |h| over its
+    limit among working wheels during the flight. flown: length of the flight (s). orbit: orbital period (s), None without an
+    orbit. refused: why the law cannot fly with the remaining wheels; then there is no flight."""
 
     lost: tuple[int, ...]
     lacking: tuple[tuple[float, ...], ...]
@@ -105,8 +104,7 @@ def study(
     all cases. The loss occurs at time 0 and is known at once: the torque is reallocated to the remaining wheels, and gains
     designed for a degree of stability are redesigned for the remaining torque. `notice` is called with the number done, the
     total, and the next loss. proof: whether to prove a pointing bound for each loop. InputError where the scenario has no
-    wheels.
-    """
+    wheels."""
     wheels = require_wheels(scenario)
     count = len(wheels.axes)
     losses = [lost for size in range(3) for lost in combinations(range(1, count + 1), size)]
@@ -256,8 +254,7 @@ def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
 def saturation(times: Array, filled: Array, period: float | None) -> Saturation:
     """Return the first saturation, from times (n,; s), momenta relative to their limits (n, wheels) and the orbital period
     (s). The growth over the last orbit (or the last half of the flight, if shorter or without an orbit) is extrapolated from
-    the largest momentum of the same sign in this window; the time is accurate to within an orbit.
-    """
+    the largest momentum of the same sign in this window; the time is accurate to within an orbit."""
     beyond = np.argwhere(np.abs(filled) > FULL)
     if len(beyond):
         row, wheel = beyond[0].tolist()

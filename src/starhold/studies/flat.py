@@ -1,7 +1,6 @@
 """All numbers of a loop, flattened into one row with names, and the test whether an equation gives them. To decide for which
 keys of a file an equation is valid, scenarios with other values are built and their numbers compared with those of the
-equation, to the last bit.
-"""
+equation, to the last bit."""
 
 from __future__ import annotations
 

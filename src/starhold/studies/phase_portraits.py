@@ -54,8 +54,7 @@ def portraits(problem: InvariantProblem, certificate: Certificate) -> list[Portr
 
 def paths(system: System, box: Sequence[tuple[float, float]], starts: Any, length: float, steps: int = 400) -> Any:
     """Return motions (N, n, steps + 1) from starts (n, N), in steps of arc length, backwards in time for a negative length,
-    with parameters at the midpoints of their intervals. A motion that would reverse, as at an equilibrium, ends.
-    """
+    with parameters at the midpoints of their intervals. A motion that would reverse, as at an equilibrium, ends."""
     what = Candidate(system, Polynomial.constant(0), tuple(box))
     moving, count = len(system.variables), np.shape(starts)[1]
     others = [np.full(count, 0.5 * (low + high)) for low, high in what.box[moving:]]

@@ -25,12 +25,11 @@ FOUND = ("level", "highest", "end.angle", "end.rate", "settling")
 
 @dataclass(frozen=True)
 class ProvedPointing:
-    """The proved pointing bound of a loop. text: the claim that leaves out the fewest parts, or why there is none;
-    beside: another claim, which leaves out more. angle: the bound (rad) at all times after `settling` (s); None where none
-    is proved. share: the share of orbits for which it holds, None for all. left_out: parts outside the claim. starts_inside:
-    whether the scenario starts in the certified set. shares: the decrease (rad) of the bound without each source; None for
-    a source that the claim ignores, or without which no bound is proved.
-    """
+    """The proved pointing bound of a loop. text: the claim that leaves out the fewest parts, or why there is none; beside:
+    another claim, which leaves out more. angle: the bound (rad) at all times after `settling` (s); None where none is
+    proved. share: the share of orbits for which it holds, None for all. left_out: parts outside the claim. starts_inside:
+    whether the scenario starts in the certified set. shares: the decrease (rad) of the bound without each source; None for a
+    source that the claim ignores, or without which no bound is proved."""
 
     text: str
     angle: float | None = None

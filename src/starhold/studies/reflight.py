@@ -136,17 +136,12 @@ def reflight(scenario: Scenario, laws: Collection[str] | None = None) -> Refligh
         elif loop.nominal is not None:
             grounded[entry.name] = SUPPOSED
         else:
-            gain_keys = [
-                key for key in gains if key.startswith(f"law.{entry.name}.") and key[len(entry.name) + 5 :] in _names(entry)
-            ]
+            own = {f"law.{entry.name}.{item.name}" for item in entry.law.fields()}
+            gain_keys = [key for key in gains if key in own]
             reflown.append(
                 _reflown(explicit, entry, loop, {key: dials[key] for key in (*shared, *gain_keys)}, tried, checks.fixed)
             )
     return Reflight(explicit, dials, gains, tuple(reflown), grounded, tuple(_pieces(explicit, dials)), checks)
-
-
-def _names(entry: LawEntry) -> list[str]:
-    return [item.name for item in entry.law.fields()]
 
 
 def _is_numbers(value: Any) -> bool:

@@ -42,9 +42,8 @@ class Served:
 
     @property
     def timing(self) -> dict[str, Any] | None:
-        """The timing in real time, in seconds of the clock: the period, the latency of each command from the
-        readings, the delay with which the plant began each period, and the number of periods without a command; None in
-        lockstep."""
+        """The timing in real time, in seconds of the clock: the period, the latency of each command from the readings, the
+        delay with which the plant began each period, and the number of periods without a command; None in lockstep."""
         plant, rate = self.plant, self.plant.rules.rate
         if rate is None:
             return None

@@ -92,9 +92,8 @@ def peak_required(
 
 class Deficit(NamedTuple):
     """The effects of a control below the circle's demand: the largest radius kept by the formula (m), the visible share of
-    the Sun there, the largest radius if the sail loses that light too (m; 0 for none), the rates at which the full circle
-    is still kept (Omega; None for none), and the share of a revolution with saturated control there.
-    """
+    the Sun there, the largest radius if the sail loses that light too (m; 0 for none), the rates at which the full circle is
+    still kept (Omega; None for none), and the share of a revolution with saturated control there."""
 
     missing: float
     radius: float

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.floating[Any]]
 
 BITS = 400
-"""Working precision: rates of a loop and gains may each span a hundred binary digits, and the equations contain
-products."""
+"""Working precision: rates of a loop and gains may each span a hundred binary digits, and the equations contain products."""
 
 AGREED = 1e-40
 """Newton's iteration ends when no entry of P changes by more than this share of the scale of its row and column."""

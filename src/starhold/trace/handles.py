@@ -1,5 +1,4 @@
-"""Handles stand for values while equations are recorded; they record operations and refuse those that cannot be
-recorded."""
+"""Handles stand for values while equations are recorded; they record operations and refuse those that cannot be recorded."""
 
 from __future__ import annotations
 

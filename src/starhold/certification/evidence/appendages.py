@@ -42,9 +42,9 @@ MORE, MARGIN, ROOM, TRIES, DIGITS = 1.0 + 1e-9, 1.001, 1.01, 30, 26
 FIRST = (1, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
 """The periods of the first rounds."""
 MOST_ROUNDS, NEARER, SHRUNK, STILL, LONGEST, LEFT, SHARE = 24, 0.95, 0.25, 0.98, 2**22, 1e-3, 27
-"""The most rounds, how much nearer each later one is to lead, the share of bounds that is to be left before it, what of that
-share is hardly less, the most periods until then, the share of a response that is left as it ends,
-and the work of a check by that of its samples for n states, n (n + 12), where these take a fifth of it."""
+"""The most rounds; how much nearer each later one must lead; the share of bounds that is to be left before it; the ratio at
+which they hardly shrink; the most periods until then; the share of a response that is left as it ends; and the work of a
+check per sample of a response for n states, n (n + 12), where samples take a fifth of it."""
 Found: TypeAlias = "tuple[dict[str, Any], list[Round], Column, Period]"
 """The numbers of a start, rounds, bounds of samples as the last begins, and its period."""
 
@@ -195,12 +195,12 @@ class Swinging:
         return all(float(sizes[name]) < x for name, x in self.limits.items())
 
     def round(self, begun: Column, periods: int, like: Period | None) -> tuple[Round, Period] | None:
-        """Return bounds for so many periods of motions that begin within bounds, for ever if these are none, and what
-        follows from them; None where none were found. like: the period of a round before."""
+        """Return bounds for so many periods (0: for ever) of motions that begin within bounds, and what follows from them;
+        None where none were found. like: the period of an earlier round."""
         motion, radii = self.motion, [float(x) * MARGIN for x in begun]
         reached = self.reached(radii, like)
         for _ in range(TRIES):
-            # Nothing is without a size.
+            # No entry may be zero.
             state, torque = ([Fraction(float(x) * ROOM + 1e-9 * float(max(part))) for x in part] for part in reached)
             try:
                 period = motion.period(Box(state, torque, combined(state, motion.misread)))
@@ -216,8 +216,8 @@ class Swinging:
         return None
 
     def lasting(self, period: Period, begun: Column) -> tuple[Column, int]:
-        """Return bounds after so many periods that states or turns are much smaller, or shrink no further, and how many
-        these are."""
+        """Return bounds after the periods in which states or turns become much smaller, or shrink no further, and the number
+        of these."""
         periods, last, (far, turned) = FOLLOWED, 1.0, self.extent(begun)
         while True:
             later = after(period, begun, periods)
@@ -263,8 +263,8 @@ def modes_of(motion: Appended) -> tuple[Array, list[int]]:
 
 
 def kept_for(periods: int, grown: Array, more: Array, begun: Array) -> list[float] | None:
-    """Return a little more than the least bounds of what begins within bounds, for so many periods of r+ <= grown r + more,
-    for none those that are never left; None where there are none."""
+    """Return slightly more than the least bounds, over so many periods (0: for ever) of r+ <= grown r + more, of what begins
+    within bounds; None where there are none."""
     most = begun
     if periods:
         for _ in range(periods - 1):

@@ -49,7 +49,7 @@ class Chain:
 
     @property
     def scales(self) -> dict[str, float]:
-        """Return the sizes of the state in the set, and of all from outside."""
+        """Return the sizes of the state in the set, and of all external inputs."""
         motion = self.motion
         sizes = motion.region(Fraction(self.level)).sizes
         return {name: float(sizes[name]) or 1.0 for name in (*STATE, *motion.others)}

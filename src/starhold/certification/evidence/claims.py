@@ -64,7 +64,7 @@ def find_taken_over(subject: Subject, rate: float | None, angle: float | None) -
         return None
     numbers, taken = dict(ending["numbers"]), [*ending["taken"], HANDED]
     if "level" in numbers and rate is not None:
-        # Which of its quaternions tells an attitude matters but for these.
+        # For the other theorems it matters which of its quaternions describes an attitude.
         either = ending["theorem"] == EVENLY or SHORTEST in taken
         numbers |= {"start.rate": rate, "start.angle": angle if angle is not None and either else float(ANY_ANGLE)}
     loop.claims.clear()

@@ -1,5 +1,5 @@
 """Finds the claim about a law that opposes the change of the magnetic field: rates of the body, and above which turning of
-the field in it the kinetic energy falls."""
+the field in it the kinetic energy decreases."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ IDLE = "inactive-wheels"
 """The wheels of a mode in which they are inactive."""
 MORE = 1.0 + 1e-6
 LESS, PART, LEVELS, SLOWEST = 1.3, 3.0, 3, 100.0
-"""The ratio of a rate to the next that is tried until the energy is shown to fall, and from then on; the most rates of a
+"""The ratio of a rate to the next that is tried until the energy is shown to decrease, and from then on; the most rates of a
 claim; the ratio of the first to the last that is tried."""
 STATES = 20_000
 """How many rates are drawn for the largest gyroscopic acceleration."""
 NEARLY = 1e-3
-"""The share of a rate by which the field's turning, above which the energy falls, is less at least."""
+"""The least share of a rate by which the turning rate of the field, above which the energy decreases, is smaller."""
 
 
 def find_detumbling(subject: Subject) -> RecordedLoop:
-    """Find the claim for about the largest rate that the energy at the start allows, and for parts of it, while the field's
-    turning above which the energy is shown to fall is slower than the body."""
+    """Find the claim for about the largest rate that the energy at the start allows, and for parts of it, while the energy
+    is shown to decrease for a field that turns slower than the body."""
     loop = RecordedLoop(subject)
     try:
         words, numbers = bounds_of(subject)
@@ -114,7 +114,8 @@ def stored(momenta: Any, axes: Any) -> float:
 
 
 def levels(wired: AttitudeLoop, fastest: float) -> dict[str, Any]:
-    """Return the numbers of rates, the largest first, at which the energy falls while the field turns slower than that."""
+    """Return the numbers of rates, the largest first, at which the energy decreases while the field turns slower than
+    that."""
     numbers, rate, count = dict[str, Any](), fastest, 0
     while rate > fastest / SLOWEST and count < LEVELS:
         level = level_at(wired, Fraction(rate))
@@ -125,7 +126,7 @@ def levels(wired: AttitudeLoop, fastest: float) -> dict[str, Any]:
 
 
 def level_at(wired: AttitudeLoop, rate: Fraction) -> dict[str, Fraction]:
-    """Return the numbers of a rate; empty where the energy is not shown to fall."""
+    """Return the numbers of a rate; empty where the energy is not shown to decrease."""
     bounds, gain = wired.claim.numbers, wired.claim.subject["gains.k"]
     if "limit" in bounds and bounds["limit"] <= gain * (rate + bounds["field.change"]):
         return {}

@@ -43,7 +43,7 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
             return inf, A, shares
         solution: Array = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
         symmetric = (solution + solution.T) / 2.0
-        # So much larger that no corner leaves it.
+        # Enlarged so that no corner leaves it.
         room = symmetric - corners @ symmetric @ corners.transpose(0, 2, 1) / kept
         if np.linalg.eigvalsh(room).min() <= 0.0:
             return inf, A, shares
@@ -128,8 +128,8 @@ def top(a: Array, b: Array) -> float:
 
 
 def ends(motion: Held, tube: Tube, X: Rows, swayed: Radii = AT_REST) -> tuple[float, float]:
-    """Return bounds of the angle (rad) and the rate (rad/s) of motions, also between samples, that at samples are within
-    `swayed` of an ellipsoid."""
+    """Return bounds of the angle (rad) and the rate (rad/s), also between samples, of motions that stay within `swayed` of
+    an ellipsoid at samples."""
     shape, drift = floats(X), float(norm(tube.drift))
     wide, turned = (
         sqrt(float(np.linalg.eigvalsh(shape[k, k])[-1])) + float(r) for k, r in zip((RATE, TURN), swayed, strict=True)

@@ -1,4 +1,4 @@
-"""Finds the weight of a torque that is late, beside V, and how late it is in the beginning."""
+"""Finds the weight of a late torque's error beside V, and how late the torque is at the start."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from starhold.parts import contract
 DIGITS, STARTS, BEYOND = 7, 500, 1.02
 """The digits of numbers; how many starts are tried, and the margin for others."""
 MARGINS = (1.05, 1.05, 1.05, 1.1)
-"""By how much each bound of a part is larger than what follows from the one before."""
+"""The factors by which the bound of each part exceeds what follows from the one before."""
 LEAST, FINE = 1.0 - 3e-6, 1 << 30
-"""How exactly numbers are known that other machines may round otherwise, and the denominator of shares."""
+"""The margin of numbers that other machines may round otherwise, and the denominator of shares."""
 WEIGHT, SLIGHTEST = 0.9, Fraction(1 << 60)
-"""The weight with which what is late costs V the least, where it does so by the product of two forms; and one with which it
-is next to nothing on a level."""
+"""The weight at which a late torque costs V the least, where its cost is the product of two forms; and one at which it is
+negligible on a level."""
 
 
 def numbers_of(late: contract.Late | None) -> dict[str, Any]:
-    """Return the numbers of a claim about a torque that is late, before its weight is known."""
+    """Return the numbers of a claim about a late torque, before its weight is known."""
     if late is None:
         return {}
     numbers = {"kept": late.kept, "mean": late.mean, "most": late.most, "weight": 1.0, "begun": 0.0, "rest": 0.0}
@@ -42,8 +42,8 @@ def numbers_of(late: contract.Late | None) -> dict[str, Any]:
 
 
 def alike(late: contract.Late) -> list[tuple[Fraction, Fraction]]:
-    """Return what is known at most and at least, in short numbers, of how late a torque is that nears what is asked for
-    alike in all components: in the end of a period, in the mean, and in that by the time that is left."""
+    """Return upper and lower bounds, in short numbers, of the lag of a torque that approaches the command alike in all
+    components: at the end of a period, in the mean, and in the mean weighted by the remaining time."""
     shares = [(float(getattr(late, name)), least) for name, least in zip(KNOWN, late.least, strict=True)]
     return [(Fraction(ceil(x * FINE), FINE), Fraction(floor(y * LEAST * FINE), FINE)) for x, y in shares]
 
@@ -54,12 +54,12 @@ def of_late(late: Late | None) -> dict[str, Fraction]:
 
 
 def weighed(motion: Held, scales: Mapping[str, float]) -> Late | None:
-    """Return how late the torque is with the weight with which it costs V about the least near the target, where rates and
+    """Return how late the torque is, with the weight at which it costs V about the least near the target, where rates and
     turns are of these sizes."""
     scale: Any = np.array([scales[name] for name in STATE])
     if motion.late is None:
         return None
-    # Next to nothing is late there.
+    # A late torque is negligible there.
     motion.late = replace(motion.late, weight=SLIGHTEST)
     change = motion.change_in(motion.tube(motion.region((motion.s + motion.G[3][3]) / 2**20)))
     assert change is not None
@@ -69,7 +69,7 @@ def weighed(motion: Held, scales: Mapping[str, float]) -> Late | None:
 
 def begun_late(motion: Held, turn: float, rate: float) -> Late | None:
     """Return how late the torque is at the start, from up to a turn (the sine of half the angle) and a rate (rad/s): if it
-    begins with none it is off by what the law asks for."""
+    begins with none, its error is the command."""
     if motion.late is None:
         return None
     r, names = np.random.default_rng(1), ["q0", *STATE[TURN], *STATE[RATE]]
@@ -81,8 +81,8 @@ def begun_late(motion: Held, turn: float, rate: float) -> Late | None:
 
 
 def resting(motion: Held, level: float) -> Late | None:
-    """Return how late the torque is with what its part that no weight pays for is at most in {V <= level}; where that is not
-    bounded, with none."""
+    """Return how late the torque is, with a bound over {V <= level} of the part of its error that no weight pays for;
+    without that part where it is not bounded."""
     if motion.late is None:
         return None
     late = unrested = motion.late = replace(motion.late, rest=Fraction(0))

@@ -220,8 +220,8 @@ class Pushed:
         return []
 
     def trials(self, angle: float, rate: float, limits: dict[str, float]) -> Iterator[list[Chain]]:
-        """Yield chains to try together: one for each lean of V; or within limits one alone, by each V of which the set asks
-        for little torque, and at last by the locally best one."""
+        """Yield chains to try together: one for each lean of V; or within limits one at a time, for each V whose set demands
+        little torque, and at last for the locally best one."""
         if not limits:
             yield [self.chain(lean.shape, angle, rate) for lean in self.leans]
             return

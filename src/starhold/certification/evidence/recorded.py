@@ -261,7 +261,7 @@ class RecordedLoop:
         return shared | ({"limit" if loop.limit == "axis" else "limit.norm": limit} if isfinite(limit) else {})
 
     def is_told(self, name: str) -> bool:
-        """Return whether the law's program reads a part of a vector."""
+        """Return whether the law's program reads a component of a vector."""
         law = self.roles["law"]
         return any(one.startswith(f"{name}.") for one in Program.read(self.by_digest[law]).inputs)
 
@@ -284,8 +284,8 @@ class RecordedLoop:
 
 
 def memory_torque(loop: RecordedLoop) -> Fraction:
-    """Return the torque (N m) that a law's memory adds about an axis at most: half of what the values differ that it clips
-    to. RefusedError where it clips to no two values that differ by a number."""
+    """Return the largest torque (N m) that a law's memory adds about an axis: half the difference of the values to which it
+    clips. RefusedError where no two of these differ by a number."""
     wired = AttitudeLoop(read(loop.claim("points", [], None), loop.by_digest))
     program = wired.claim.programs["law"]
     memory = {name: var(f"m{k}") for k, name in enumerate(program.inputs) if name.startswith("memory.")}

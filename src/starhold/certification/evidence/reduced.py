@@ -11,8 +11,8 @@ from starhold.kernel.rules import Sum
 
 LEAST: dict[tuple[int, ...], tuple[int, int]] = {(): (1, 2), (0,): (0, 1)}
 FALLS: dict[tuple[int, ...], tuple[int, int]] = {(): (2, 3), (1,): (2, 2), (0,): (1, 2), (0, 1): (1, 1)}
-"""The highest powers of v, and of u and t together, by places of what is known: for V that is least on target |q|^2 - t^2,
-for V that decreases level - V and |q|^2 - t^2."""
+"""The highest powers of v, and of u and t together, by places of the known polynomials: for V that is least on target |q|^2
+- t^2, for V that decreases level - V and |q|^2 - t^2."""
 
 
 class Reduced(Guess):
@@ -23,8 +23,8 @@ class Reduced(Guess):
         super().__init__(o, scales, 4, (), None)
 
     def reduce(self) -> None:
-        """Take these squares, but those that would have to vanish. What changes its sign with v and t has its own block,
-        for nothing else does."""
+        """Take these squares without those that would have to vanish. Terms that are odd in v and t together have their own
+        block, for nothing else is."""
         self.blocks = [
             Block(places, product_of(self.known, places), powers(*size, odd))
             for places, size in self.sizes.items()

@@ -1,7 +1,8 @@
-"""Looks for V of which the level set that holds a start asks for little torque.
+"""Looks for a V whose level set contains a start and demands little torque.
 
-Of all V that decrease near the target the energy of the motion, with the law's own potential, is not the one to begin from
-limits with: its level sets hold rates that no motion from rest comes to. With a softer potential they hold lower ones.
+Among all V that decrease near the target, the energy with the law's own potential is not the one to begin with where the
+torque is limited: its level sets contain rates that no motion from rest reaches. With a softer potential they contain lower
+ones.
 """
 
 from itertools import product
@@ -24,7 +25,7 @@ SOFT = (1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35, 0.29, 0.24, 0.2)
 LEANS = (0.1, 0.18, 0.3, 0.45, 0.6, 0.75, 0.9)
 """The shares of the potential that are tried, and epsilon in sqrt(the potential's stiffness / the largest moment)."""
 WITHIN = (0.98, 0.88, 0.75, 0.6)
-"""Shares of a limit that are tried for the torque of the linear motion: what is not linear, momentum and errors add some."""
+"""Shares of a limit that are tried for the torque of the linear motion: nonlinear terms, momentum and errors add to it."""
 
 
 class Shape(NamedTuple):
@@ -36,12 +37,12 @@ class Shape(NamedTuple):
 
 
 def largest_in(motion: Held, angle: float, rate: float) -> float:
-    """Return a bound of V of states turned by up to an angle (rad) at up to a rate (rad/s)."""
+    """Return a bound of V over states turned by up to an angle (rad) at up to a rate (rad/s)."""
     return float(largest(floats(motion.form(motion.s / 2))[None], motion.even, angle, rate)[0])
 
 
 def largest(P: Array, even: bool, angle: float, rate: float) -> Array:
-    """Return for matrices on (w, q), those of V near the target, bounds of V at a start."""
+    """Return, for matrices on (w, q) of V near the target, bounds of V at a start."""
     half = min(angle, np.pi) / 2.0
     away = sin(half) if even else 2.0 * sin(half / 2.0)
     wide, leant, stiff = (np.linalg.norm(P[:, a, b], 2, (1, 2)) for a, b in ((RATE, RATE), (RATE, TURN), (TURN, TURN)))
@@ -49,7 +50,7 @@ def largest(P: Array, even: bool, angle: float, rate: float) -> Array:
 
 
 def shares(motion: Held, limits: dict[str, Any]) -> Array:
-    """Return rows of which the products with the torque that is used for are shares of its limits."""
+    """Return rows whose products with the torque are shares of its limits."""
     rows = [np.zeros((0, 3))]
     rows += [np.eye(3) / x for name, x in limits.items() if name.startswith("limit")]
     count = next(k for k in range(1000) if f"wheel.{k}.axis.0" not in motion.loop.claim.subject)
@@ -61,8 +62,8 @@ def shares(motion: Held, limits: dict[str, Any]) -> Array:
 
 
 def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
-    """Return for matrices P of V how definite -V' is, as a share of its diagonal, with the acceleration near the target,
-    where q is turned so far. What is left is for what is not linear, for momentum, and for what is sampled."""
+    """Return, for matrices P of V, how definite -V' is, as a share of its diagonal, with the acceleration near the target
+    and q turned to this q0. The margin is for nonlinear terms, momentum and sampling."""
     bent = any("q0" in m and not m.isdisjoint(STATE[TURN]) for p in motion.u for m in map(frozenset, p.terms))
     flow, turned = np.zeros(P.shape), q0[:, None, None]
     flow[:, RATE, RATE], flow[:, RATE, TURN] = acceleration[:, RATE], acceleration[:, TURN] * (turned if bent else 1.0)
@@ -77,8 +78,8 @@ def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
 
 
 def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> list[Shape]:
-    """Return shapes of V of which the level set that holds a start asks for no more than the limits, about: for each of some
-    shares those that are softened least, and of them the most definite. motion: with the potential as it is."""
+    """Return shapes of V whose level set around a start demands about no more than the limits: for each of some shares the
+    least softened ones, and of them the most definite. motion: with the potential as it is."""
     J, torque = floats(motion.loop.given), floats(motion.near.torque)
     potential, loads = floats(motion.form(motion.s / 2))[TURN, TURN], shares(motion, limits) @ torque
     stiff, moment = float(np.linalg.eigvalsh(potential)[-1]), float(np.trace(J)) / 3.0
@@ -96,7 +97,7 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> lis
     shapes, P = [s for s, d in zip(shapes, definite, strict=True) if d], forms[definite]
     level = largest(P, motion.even, angle, rate)
     used = np.sqrt(level * np.einsum("li,nij,lj->nl", loads, np.linalg.inv(P), loads).max(1, initial=0.0))
-    # At rest to every side: over the rates V is least with this of q.
+    # At rest, in each direction: the least V over the rates has this form in q.
     stiff = np.linalg.eigvalsh(P[:, TURN, TURN] - P[:, TURN, RATE] @ np.linalg.solve(P[:, RATE, RATE], P[:, RATE, TURN]))
     far = level / stiff[:, 0]
     least = np.sqrt(np.maximum(1.0 - far, 0.0)) if motion.even else 1.0 - far / 2.0
@@ -106,7 +107,7 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> lis
     softness, ball = np.array([s.soft for s in shapes]), np.array([s.moment is not None for s in shapes])
     for share, about in product(WITHIN, (False, True)):
         fit = (used < share) & (margins > 0.0) & (ball == about)
-        # About all axes alike the gyroscopic torque does work: there the most definite one is taken.
+        # With one moment about all axes, the gyroscopic torque does work: there the most definite one is taken.
         fit &= about | (softness == softness[fit].max(initial=0.0))
         if fit.any():
             chosen[shapes[int(np.argmax(np.where(fit, margins, -np.inf)))]] = None

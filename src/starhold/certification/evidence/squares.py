@@ -102,8 +102,8 @@ def free(columns: Sequence[Poly], z: Sequence[Poly]) -> Sequence[Poly]:
 
 
 def settled(o: Squares) -> tuple[Poly, list[Poly], dict[int, Fraction]]:
-    """Return p and what is known, without what is known of variables that z has not: p has as much of it as its coefficient
-    says, if it has the sign."""
+    """Return p and the known polynomials without those in variables that z lacks: the coefficients of p determine their
+    multipliers, if the signs fit."""
     names, p, fixed = {name for z in o.z for name in z.names}, o.p, dict[int, Fraction]()
     known = [*o.strict, *o.known]
     for place, g in enumerate(known):
@@ -234,7 +234,7 @@ def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
     if x is None or x[-1] < DEFINITE:
         return None
     x = x[:-1]
-    # What is only rounding would have to be made up for elsewhere.
+    # Numbers that are only rounding would have to be compensated elsewhere.
     return np.where(np.abs(x) < 1e-11 * np.abs(x).max(), 0.0, x) * unit / largest
 
 

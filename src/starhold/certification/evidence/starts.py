@@ -1,4 +1,5 @@
-"""From where a claim about the loop that flies is sought: the rate of the loop's start, its stiffness, and sound sets."""
+"""Where the search for a claim about the loop that flies begins: the rate of the loop's start, its stiffness, and sound
+sets."""
 
 from collections.abc import Mapping
 from fractions import Fraction

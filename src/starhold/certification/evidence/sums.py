@@ -56,9 +56,9 @@ class Block:
 
 
 class Guess:
-    """The search for evidence of a sum. scales: about how large variables become; `basis`: of what squares are made beside
-    monomials; `pairs`: which products of two known polynomials are tried; `curved`: without what is known of first degree.
-    """
+    """The search for evidence of a sum. scales: approximate sizes of the variables; `basis`: what squares are made of
+    besides monomials; `pairs`: which products of two known polynomials are tried; `curved`: without known polynomials of
+    first degree."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class Guess:
         self.known = [self.scaled(q) * (1 / u) for q, u in zip(o.known, self.units, strict=True)]
         self.modulo = [self.scaled(q) for q in o.modulo]
         self.p = self.p * (1 / self.size)
-        # Where all that is asked vanishes with some variables, whatever the others (parameters) are.
+        # Variables with which all strict polynomials vanish, whatever the others (parameters) are.
         moving = {x for q in o.strict for x in q.names}
         moving |= {f"{f}.{x}" for f in ("sin", "cos") for x in moving}
         self.moving = moving if all(moving.intersection(m) for q in (o.p, *o.strict) for m in q.terms) else set[str]()
@@ -106,7 +106,7 @@ class Guess:
         made = [
             times(q, m) for q in scaled_basis for m in monomials(names, min(max(top - degree(q), 0), 2)) if degree(q) <= top
         ]
-        # A factor may vanish with the basis: then its squares are of anything.
+        # A factor may vanish with the basis: then its squares may contain anything.
         if any(solved(self.known[k], multiples(scaled_basis, self.known[k])) is not None for k in places):
             return monomials(names, min(top, 2))
         return independent(made)
@@ -121,7 +121,7 @@ class Guess:
         return Poly(terms)
 
     def reduce(self) -> None:
-        """Leave out what cannot have a square: nothing else has its monomial, or all that has has its sign."""
+        """Leave out monomials that cannot have a square: nothing else contains it, or everything that does has its sign."""
         while True:
             free = {m for q in (self.p, *(c for columns in self.loose for c in columns)) for m in q.terms}
             squares: dict[Monomial, list[tuple[int, int, bool]]] = defaultdict(list)
@@ -214,7 +214,7 @@ class Guess:
         return None
 
     def amiss(self, y: list[Fraction]) -> Terms:
-        """Return what is missing of p."""
+        """Return the residual of p."""
         single, grams = self.columns
         rest = dict(self.p.terms)
         for v, q in zip(y, [*single, *grams], strict=True):
@@ -231,7 +231,7 @@ class Guess:
         return dict(places)
 
     def projected(self, y: list[Fraction], rest: Terms, covered: Mapping[Monomial, Any]) -> list[Fraction] | None:
-        """Put what is amiss of monomials that are not covered on as few numbers as it takes."""
+        """Put the residual of monomials that are not covered on as few numbers as possible."""
         single, grams = self.columns
         every = [Poly({m: c for m, c in q.terms.items() if m not in covered}) for q in (*single, *grams)]
         step = solved(Poly(rest), every)
@@ -275,7 +275,7 @@ class Guess:
 
 
 def divided(o: Sum, *more: Any) -> dict[str, Any] | None:
-    """Return evidence where all that is asked has a factor that is known; None where that is not so."""
+    """Return evidence where everything wanted has a known factor; None otherwise."""
     for k, q in enumerate(o.known if any(p.terms for p in o.strict) else ()):
         parts = [quotient(p, q) for p in (o.p, *o.strict)] if q.names else [None]
         if None not in parts:
@@ -291,7 +291,7 @@ def divided(o: Sum, *more: Any) -> dict[str, Any] | None:
 
 
 def eliminated(o: Sum, q: Poly, x: str, *more: Any) -> dict[str, Any] | None:
-    """Return evidence by that without a variable, which a relation tells."""
+    """Return evidence found without a variable, which a relation determines."""
     instead = {x: Poly({(x,): Fraction(1)}) - q * (1 / q.terms[(x,)])}
     others = [r for r in o.modulo if r is not q]
     evidence = find(Sum(o.p.at(instead), *([r.at(instead) for r in polys] for polys in (o.known, others, o.strict))), *more)
@@ -318,7 +318,7 @@ def find(
     degrees: Sequence[int] = (0, 2),
     exact: bool = True,
 ) -> dict[str, Any] | None:
-    """Return evidence that the kernel accepts (exact False: that floats have some); None where none was found."""
+    """Return evidence that the kernel accepts (exact False: a sum in floats); None where none was found."""
     simple = identity(o)
     if simple is None:
         simple = divided(o, scales, basis, degrees, exact)

@@ -1,6 +1,5 @@
 """Finds evidence for the kernel's theorems on a function V: hints, the largest level, sums of squares. Nothing here is
-trusted: evidence counts once the kernel has accepted it.
-"""
+trusted: evidence counts once the kernel has accepted it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
@@ -25,7 +24,7 @@ LESS = (1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1)
 """How far below the largest level that floats find exact evidence is tried."""
 HALVINGS = 18
 CLOSE, FAR = 1e-5, 5e-4
-"""How nearly floats find the largest level, of one cell and of more."""
+"""How nearly floats find the largest level, for one cell and for more."""
 DEGREES = {False: (0, 2), True: (0, 2, 4)}
 """Degrees above that of the obligation. Angles need more, because of their series, and so does a core that contains {V <=
 0}, because of V."""
@@ -95,7 +94,7 @@ class Attempt:
 
 
 def proved(attempt: Attempt, top: float, escape: Poly | None) -> dict[str, Any] | str:
-    """Return the claim with evidence, at the largest level up to `top` where none is told, or why none was found."""
+    """Return the claim with evidence, at the largest level up to `top` where none is given, or why none was found."""
     levelled = attempt.theorem in ("attracts", "is stable") and "level" not in attempt.numbers and top < float("inf")
     try:
         if levelled:

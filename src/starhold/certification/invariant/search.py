@@ -52,8 +52,8 @@ class Cell:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A system, a function V and a box; M is {V <= 0} in it. `equilibrium`: the point that M is told to be, a number for
-    every variable; else None."""
+    """A system, a function V and a box; M is {V <= 0} in it. `equilibrium`: the point that M is, a number for every
+    variable; else None."""
 
     system: System
     V: Any
@@ -202,7 +202,7 @@ def _refined(what: Candidate, start: Array, sense: int, spread: Array, count: in
 
 
 def stuck(what: Candidate) -> list[Array]:
-    """Rests of single cells with V > 0, by Newton's method from a coarse grid."""
+    """Equilibria of single cells with V > 0, by Newton's method from a coarse grid."""
     states: list[Array] = []
     system, moving = what.system, len(what.system.variables)
     units = [[poly(int(j == k)) for j in range(moving)] for k in range(moving)]

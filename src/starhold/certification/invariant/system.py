@@ -55,7 +55,7 @@ class System:
         return equation(*(Polynomial.variable(name) for name in self.inputs))
 
     def with_angles(self, points: Any) -> Any:
-        """Points (n, N) of the names as points of the inputs as the kernel has them: of a cosine what it lacks to one."""
+        """Points (n, N) of the names as points of the inputs in the kernel's form, with 1 - cos for a cosine."""
         turns = [points[self.variables.index(x)] for x in self.angles]
         return np.array([*points, *(value for turn in turns for value in (np.sin(turn), 1.0 - np.cos(turn)))])
 

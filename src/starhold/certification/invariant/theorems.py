@@ -39,7 +39,7 @@ KERNEL = {"stable": "is stable", "unstable": "is unstable", "avoids": "avoids"}
 """The kernel's theorems; the others are about what attracts."""
 THEOREMS = ("stable", "attracts", "region", "unstable", "intersection", "avoids")
 ATTRACTING = ("attracts", "region")
-"""The theorems that may be told a core, and a set that motions start from."""
+"""The theorems that may have a core, and a set from which motions start."""
 STEPS = {
     "positive": "positive", "border": "bounded", "changes": "falls", "agree": "switching", "continuous": "continuous",
     "never": "falls", "start": "start", "unsafe": "unsafe", "barrier": "barrier",
@@ -208,7 +208,8 @@ class _Proof:
         )
 
     def polynomial(self, function: Any) -> Exact:
-        """Return a function that is not piecewise as the kernel has it: from the equilibrium, of a cosine what it lacks."""
+        """Return a function that is not piecewise in the kernel's form: relative to the equilibrium, with 1 - cos for a
+        cosine."""
         system = self.what.system
         first, *more = pieces(function)
         if more:

@@ -37,8 +37,7 @@ def campaign(
     ] = False,
     search: Annotated[bool, typer.Option("--search/--no-search", help="search for worst cases of required metrics")] = True,
     proof: Annotated[
-        bool,
-        typer.Option("--proof", help="also compare flights with the claim about the loop; this takes seconds"),
+        bool, typer.Option("--proof", help="also compare flights with the claim about the loop; this takes seconds")
     ] = False,
     threads: Annotated[int | None, typer.Option(help="threads of this process; all cores by default")] = None,
     workers: Annotated[int | None, typer.Option(help="processes on this machine in place of threads")] = None,

@@ -70,8 +70,7 @@ def check(
     ] = None,
 ) -> None:
     """Check a certificate independently of the program that made it; only the claims are taken from the file. The kernel,
-    which is also in kernel.pyz beside the file, checks the proofs; other claims are undecided.
-    """
+    which is also in kernel.pyz beside the file, checks the proofs; other claims are undecided."""
     import hashlib
     from contextlib import ExitStack
 

@@ -1,5 +1,5 @@
-"""The theorem about the loop that flies with appendages, near its target: the torque is held between samples, torques from
-outside and errors are bounded, and the motion of body and appendages is a program. Proof: docs/kernel.md, section 12."""
+"""The theorem about the loop that flies with appendages, near its target: the torque is held between samples, external
+torques and errors are bounded, and the motion of body and appendages is a program. Proof: docs/kernel.md, section 12."""
 
 from __future__ import annotations
 
@@ -20,19 +20,20 @@ from .response import PARTS, Response, summed
 
 KINDS = (0, 1), (2,), (3,)
 ROUNDS, FOLLOWED = 32, 1024
-"""The most rounds, and up to how many periods of one are followed one by one."""
+"""The most rounds, and the most periods of one that are followed one by one."""
 
 
 def points_with_appendages(claim: Claim) -> Proof:
-    """Every motion from {V <= level}, with states of the appendages of at most begun.k, has V <= highest at all times, and
-    after the time `settling` it is at all times turned by no more than end.angle and turns no faster than end.rate. The
-    torque is what the law asks for at the last sample and an error, |error| <= error, within its limits where they are told;
-    it is told the attitude turned by error.attitude at most, and the rate off by error.rate; torques from outside are no
-    more than `outside`. Both may grow by `.per.rate` times the body's rate.
+    """Every motion from {V <= level}, with states of the appendages of at most begun.k, has V <= highest at all times; after
+    the time `settling` its rotation is at all times at most end.angle and its rate at most end.rate. The torque is the law's
+    command at the last sample plus an error, |error| <= error, within its limits where these are stated; errors of the
+    measured attitude and rate are at most error.attitude and error.rate; external torques are at most `outside`. `error` and
+    `outside` may grow by `.per.rate` times the body's rate.
 
-    Evidence: modal coordinates, in blocks of one or two, and rounds of bounds: of them at samples (radii), of the states and
-    the torque between samples, and after how many periods the next round begins; the last one has no end. In its box
-    the response of the linear motion may be summed."""
+    Evidence: modal coordinates, in blocks of one or two, and rounds of bounds: at samples (radii), of the states and the
+    torque between samples, and the number of periods until the next round; the last one has no end. In its box the response
+    of the linear motion may be summed.
+    """
     loop, numbers = AttitudeLoop(claim), claim.numbers
     yield from vanish("turning", minus(loop.single("turning", 4, wired("q", loop.q), wired("rate", loop.w)), loop.turning))
     motion = Appended(loop)
@@ -60,7 +61,7 @@ def points_with_appendages(claim: Claim) -> Proof:
         if 0 < periods <= FOLLOWED:
             largest, later = follow(period, begun, periods)
         else:
-            # What is not left in one period is not left in any.
+            # What motions do not leave in one period they never leave.
             largest = [max(x, y) for x, y in zip(begun, combined(image(period.grown, radii), period.more), strict=True)]
             later = [min(x, r) for x, r in zip(after(period, begun, periods), radii, strict=True)]
         felt = image(period.torque, radii)
@@ -99,19 +100,19 @@ def points_with_appendages(claim: Claim) -> Proof:
     assumed = ["appendages-as-given", "bounded-push", "held-torque", *unlimited, *loop.untold]
     assumed += ["target-at-rest", "no-wheels"]
     said = f"; {enumerated(start)}" if start else ""
-    # From the start of a round on, motions are turned by no more than in it and in later ones.
+    # From the start of a round on, rotations are within the bounds of that round and of later ones.
     within = [(time, max(turned[k:])) for k, time in enumerate(times)]
     return Statement(text + said, (*assumed, loop.sign_assumed), "appendages", within=tuple(within))
 
 
 def responds(motion: Appended, weights: object, gains: object) -> Part[Response]:
-    """The gains are no less than those of the linear motion of body and appendages: of rates, turns and the acceleration
-    that is linear in it, under torques from outside, which are free in a period, and under those held in error."""
+    """The gains bound those of the linear motion of body and appendages: of rates, turns and the linear acceleration, under
+    external torques, which vary freely within a period, and under held torque errors."""
     return summed(scalar(1, motion.n)[:6] + motion.pull, PARTS, motion.sampled, motion.ways, KINDS, weights, gains)
 
 
 def settled(motion: Appended, response: Response, period: Period, box: Box, radii: Column) -> tuple[Fraction, Fraction]:
-    """Return bounds of |w| and |q| at all times from so many samples in a box on."""
+    """Return bounds of |w| and |q| at all times, once so many samples have stayed in a box."""
     wrong = period.error + norm(combined(image(period.law, radii), period.law_rest))
     rest, pushes = motion.beside(period, box, wrong), (period.outside, period.outside, wrong)
     wide, turned, pulled = (
@@ -126,7 +127,7 @@ def settled(motion: Appended, response: Response, period: Period, box: Box, radi
 
 
 def inner(loop: AttitudeLoop, level: Fraction) -> Rows:
-    """Return the matrix of an ellipsoid of (w, q) that holds {V <= level} where q0 > 0, for V = s (1 - q0) + x.Gx. There
+    """Return the matrix of an ellipsoid of (w, q) that contains {V <= level} where q0 > 0, for V = s (1 - q0) + x.Gx. There
     2 (1 - q0) >= |q|^2."""
     s, G = form_of(loop)
     demand(s >= 0 and definite(G, strictly=False), "V is not least on target")
@@ -143,7 +144,7 @@ def positive(given: object, count: int) -> Column:
 
 
 def exceed(name: str, large: Column, small: Column) -> Part[None]:
-    """Each of some numbers is larger than another; they are numbered."""
+    """Each entry of one column exceeds that of another; they are numbered."""
     for k, (x, y) in enumerate(zip(large, small, strict=True)):
         yield f"{name} {k}", Exceeds(x, y)
 

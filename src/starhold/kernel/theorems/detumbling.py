@@ -29,13 +29,13 @@ class Power(NamedTuple):
 
 def detumbles(claim: Claim) -> Proof:
     """In each control period from the second measurement on in which, as in the two before, the body turns no faster than
-    rate.k, its kinetic energy falls if the held field turns in it by more than above.k on the average, from the sample
-    before to the one after, by fall.k times the period if by more than often.k, and else rises by no more than rise.k times
-    the period; for each k that is told. So the field turns faster than often.k for a part of any time only. Rods give
-    dipoles of up to dipole.limit each; the field is at least field.least, and changes from sample to sample by no more than
-    field.change times itself and the period; torques from outside are no more than `outside`, and others, at right angles to
-    the field, than outside.across. With wheels, these keep a momentum of up to `stored`. Torques that the law asks for are
-    given in full up to `limit`, or without it all of them."""
+    rate.k, its kinetic energy decreases if the held field turns in it by more than above.k on average, from the sample
+    before to the one after; by fall.k times the period if by more than often.k; otherwise it increases by at most rise.k
+    times the period; for each k that is stated. So the field turns faster than often.k for only a part of any time. Rods
+    give dipoles of up to dipole.limit each; the field is at least field.least, and changes from sample to sample by at most
+    field.change times itself and the period; external torques are at most `outside`, and others, at right angles to the
+    field, at most outside.across. Wheels, if there are any, keep a momentum of up to `stored`. Commanded torques are given
+    in full up to `limit`, or all of them without a limit."""
     loop, numbers = AttitudeLoop(claim, quotients=True), claim.numbers
     low, high = numbers["inertia.low"], numbers["inertia.high"]
     yield from loop.sound()
@@ -67,7 +67,7 @@ def detumbles(claim: Claim) -> Proof:
             f"at up to {below(rate)} rad/s above {above(least)} rad/s, and else rises by {above(rise)} W at most, so that it"
             f" is above {above(often)} rad/s for at most {above(spell)} s and {above(share)} of the time"
         )
-    demand(bool(texts), "no rate is told")
+    demand(bool(texts), "no rate is stated")
     wheels = f"wheels that keep up to {below(numbers['stored'])} N m s, " if loop.wheels else ""
     text = (
         "in each control period the kinetic energy falls where the field turns in the body, in the mean of it and the one"
@@ -87,7 +87,7 @@ def opposes_change(loop: AttitudeLoop) -> Shown:
     """With a field b the law remembers it, and its torque is m x b with m = -k (b - b before)/(period |b|^2), or none at the
     first measurement, before which no field is known."""
     b, before, subject = variables("b"), variables("m"), loop.claim.subject
-    # Of what else a law may be told a loop that is taken with nothing has less than one that flies.
+    # The measured fields that the kernel knows; a law that flies could read others.
     fields = {name.rpartition(".")[0] for name in loop.claim.programs["law"].inputs if name.startswith("measurement.")}
     demand(fields <= {"measurement", "measurement.magnetic_field"}, "the law is given more than the field")
     square, gain = dot(b, b), -subject["gains.k"] / subject["measurement.period"]
@@ -119,7 +119,7 @@ def power_at(loop: AttitudeLoop, rate: Fraction) -> Power:
     opposed = m * m - bent * bent - (mean + mean * mean * (h / 2)) * change
     demand(bend(opposed) > 0, "the body turns too far in a period")
     others = (1 + h * turned) * across * m + rate * outside + across * h * begun
-    # Rods at their limit give at least this torque, and the law asks for k times what it sees of the field's turning.
+    # Rods at their limit give at least this torque, and the law commands k times the rate at which it sees the field turn.
     most, seen = numbers["dipole.limit"] * numbers["field.least"], mean + change
     return Power(others - opposed * k, others, opposed * most - others * seen, seen)
 

@@ -52,7 +52,7 @@ class Function:
         powers = self.hint(name)
         if name != "shape" and type(powers) is int:
             return [power(self.on(i), powers)]
-        demand(self.at_point and 0 not in read_list(powers, len(self.system.names)), "a power is not told")
+        demand(self.at_point and 0 not in read_list(powers, len(self.system.names)), "a power is not stated")
         return [power(var(x) * var(x), n) for x, n in zip(self.system.names, powers, strict=True)]
 
     def confined(self, most: Fraction | int = 0) -> Shown:
@@ -109,7 +109,7 @@ class Function:
             gap = self.positive("powers", i) if strictly else []
             yield name, system.sum(rise * -self.sense, (i, j), room, [] if weak else gap, zero)
             if weak and strictly:
-                demand(escape is not None and self.sense == 1, "no function is told that grows")
+                demand(escape is not None and self.sense == 1, "no function that grows is stated")
                 yield f"{name} escapes", system.sum(system.slope(read_poly(escape), rates), (i, j), [*room, rise], gap, zero)
         for j, k in combinations(cells, 2):
             one, other = system.all[j], system.all[k]
@@ -241,5 +241,5 @@ def fails(claim: Claim) -> Proof:
         if claim.taken.get(word):
             demand(holds, f"V is not shown to fail: {word}")
             return stated(text, system)
-    raise RefusedError("it is not told how V fails")
+    raise RefusedError("how V fails is not stated")
     yield  # pragma: no cover

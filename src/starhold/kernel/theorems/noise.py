@@ -1,4 +1,4 @@
-"""How large errors become that Gaussian noise drives, but for a share of the times. Proof: docs/kernel.md, section 10."""
+"""Bounds that errors driven by Gaussian noise rarely exceed. Proof: docs/kernel.md, section 10."""
 
 from __future__ import annotations
 
@@ -32,27 +32,28 @@ from ..rules import Definite, Exceeds, Part
 from ..sentences import Statement, below
 
 SHARE, BESIDE, VECTORS = "share", "noise.beside", "noise.beside.vectors"
-"""The probability of what is left out, and the deviations within which other noise is, of so many vectors a sample."""
+"""The probability of exceeding the bounds; the bound of other noise, in deviations; and how many vectors of it a sample
+has."""
 DEVIATION = "noise.torque.deviation"
-"""That of a random torque about each axis (N m), new at each sample and held until the next."""
+"""The deviation of a random torque about each axis (N m), new at each sample and held until the next."""
 CARRIED, CORRECTED = "errors carried", "errors corrected"
 """The programs of a sample without a new measurement, and with one: from `errors` and standard normal `noise` to the errors
-at the next, and to those of the attitude and the rate that the law is told."""
+at the next sample, and to those of the attitude and the rate that the law measures."""
 TOLD = ("attitude", "rate")
 Spin = tuple[Rows, Rows]
 ROOT = Fraction(17321, 10000)
 """At least the root of 3."""
 MOST, TERMS = 64, 80
-"""How many samples there may be from one measurement to the next; terms of the exponential series."""
+"""The most samples from one measurement to the next; the terms of the exponential series."""
 PLACES, FINE, SLIGHT = 100, 160, 40
-"""Binary places of matrices and of covariances, and of the share by which rounding them widens these."""
+"""The binary places of matrices and of covariances, and of the share by which rounding widens these."""
 
 
 def within_radii(claim: Claim, motion: Held) -> Part[Statement]:
-    """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
-    than noise.attitude and noise.rate, the random torque than noise.torque, other standard normal vectors no longer than
-    noise.beside, and the rate and the turn, and the torque that lags, which the errors and this torque cause near the target
-    no larger than told, nor what momentum makes of these, but with a probability of `share` at most."""
+    """At all of `samples` samples on end, every `every`-th with a new measurement, the following bounds are exceeded with a
+    probability of at most `share`: errors of attitude and rate by noise.attitude and noise.rate, the random torque by
+    noise.torque, other standard normal vectors by noise.beside; and by the stated radii the rate, the turn and the lagging
+    torque that the errors and this torque cause near the target, and what momentum adds to these."""
     numbers = claim.numbers
     share, samples, every = (numbers[name] for name in (SHARE, "samples", "every"))
     demand(1 <= every <= MOST and every.denominator == samples.denominator == 1, "samples are not counted")
@@ -72,7 +73,7 @@ def within_radii(claim: Claim, motion: Held) -> Part[Statement]:
             [first] * (count - 1) + [last],
             [shortened(matrix(next(rows), size, size), FINE) for _ in range(count)],
         )
-        # The last sample before those of the list is like their last.
+        # The sample before the first of the list is like the last.
         pairs = pairwise([shapes[-1], *shapes])
         for k, ((before, after), step) in enumerate(zip(pairs, steps, strict=True), place * count):
             spread = covariance(before, *step)
@@ -102,8 +103,8 @@ def within_radii(claim: Claim, motion: Held) -> Part[Statement]:
 
 
 def spins_of(loop: AttitudeLoop) -> list[Spin | None]:
-    """Return what wheels' momentum makes of the rates at three of the six corners of an octahedron that holds all there may
-    be; the others are opposite to these. None without wheels."""
+    """Return what wheels' momentum adds per unit of rate at three of the six corners of an octahedron that contains every
+    momentum they may have; the others are opposite to these. None without wheels."""
     if not loop.wheels:
         return [None]
     most = ROOT * loop.claim.numbers["momentum"]
@@ -111,9 +112,8 @@ def spins_of(loop: AttitudeLoop) -> list[Spin | None]:
 
 
 def parts_of(near: Near, size: int, spins: Sequence[Spin | None]) -> dict[str, list[slice]]:
-    """Return the places of what noise drives, of which `size` are errors: of the errors that are told, and of the rate and
-    the turn that they cause, and of a torque that lags; with wheels of all with and without momentum, and half of what
-    differs."""
+    """Return the places of what noise drives, after `size` errors: the measurement errors, and the rate, the turn and a
+    lagging torque that they cause; with wheels each with and without momentum, and half of the difference."""
     wide, count = len(near.A), 2 if spins[0] else 1
     begun, names = size + count * wide, ("rate", "turn", "torque")[: wide // 3]
 
@@ -128,10 +128,10 @@ def parts_of(near: Near, size: int, spins: Sequence[Spin | None]) -> dict[str, l
 def driven(
     near: Near, errors: Rows, noise: Rows, spin: Spin | None = None, random: Fraction | None = None
 ) -> tuple[Rows, Rows]:
-    """Return A and B of the rates and the turn that errors cause near the target, the errors themselves and those told: from
-    Ax + Bn for these alone. The law is told q + e/2 and w + s. spin: with a momentum and with the opposite one, to the first
-    order, and half of what differs at the end. random: the deviation of a torque on the body; of what momentum makes of that
-    none of its own period."""
+    """Return A and B of the rates and the turn that errors cause near the target, of the errors themselves and of those of
+    the measurement, given A and B of the errors alone. The law measures q + e/2 and w + s. spin: with a momentum and with
+    the opposite one, to first order, and half of the difference at the end. random: the deviation of a torque on the body;
+    momentum has no effect on it within its own period."""
     size = len(errors) - 6
     turned, rated = ([row[part] for row in near.torque] for part in (TURN, RATE))
 
@@ -153,7 +153,7 @@ def driven(
         grown = times(near.grown, times(body, times(near.eased, torque(rows))))
         return plus(times(near.commanded, times(law, rows[size + 3 :])), grown)
 
-    # x of both signs is that without, half of their sum, and by its sign what momentum makes of that.
+    # For both signs of the momentum: x without it, half of their sum, plus or minus what momentum adds.
     half = [[x / 2 for x in row] for row in near.spun(law, body)]
     (e, spun), (n, shaken) = ((rows, more(given)) for rows, given in zip(plain, (errors, noise), strict=True))
     both = [
@@ -167,7 +167,8 @@ def driven(
 
 
 def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:
-    """Return A and B of a program that takes errors x and noise n to Ax + Bn: the next errors, and those that are told."""
+    """Return A and B of a program that maps errors x and noise n to Ax + Bn: the next errors, and those of the
+    measurement."""
     program = claim.programs[role]
     size = len(program.outputs) - 3 * len(TOLD)
     errors = [f"errors.{k // 3}.{k % 3}" for k in range(size)]
@@ -180,8 +181,8 @@ def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:
 
 
 def covariance(X: Rows, A: Rows, B: Rows) -> Rows:
-    """Return what is no less than the covariance of Ax + Bn, in numbers as short as those of X. With what is rounded off of
-    A and B, b, (a + b)(a + b)' <= (1 + 1/c) aa' + (1 + c) bb', and bb' is no more than squares of entries and the trace."""
+    """Return an upper bound of the covariance of Ax + Bn, in numbers as short as those of X. If b is what rounding removes
+    from A and B, (a + b)(a + b)' <= (1 + 1/c) aa' + (1 + c) bb', and bb' is at most squares of entries times the trace."""
     n, size, one, fine = len(A), len(X), 1 << PLACES, 1 << FINE
     whole = [[[x.numerator * one // x.denominator for x in row] for row in rows] for rows in (A, B)]
     motion, noise = ([{k: x for k, x in enumerate(row) if x} for row in rows] for rows in whole)
@@ -201,8 +202,8 @@ def covariance(X: Rows, A: Rows, B: Rows) -> Rows:
 
 
 def tail(radius: Fraction, width: Fraction) -> Fraction:
-    """Return a number that the probability of |x| > radius does not exceed, of a Gaussian x of three components with a
-    covariance of no more than width^2: sqrt(2/pi) (k + 1/k) exp(-k^2/2) with k = radius/width."""
+    """Return an upper bound of the probability that |x| > radius, for a Gaussian x of three components with a covariance of
+    at most width^2: sqrt(2/pi) (k + 1/k) exp(-k^2/2) with k = radius/width."""
     demand(width > 0, "a deviation is not positive")
     k = -up(-radius / width)
     demand(k > 0, "a radius is too small")

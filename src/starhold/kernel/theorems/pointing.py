@@ -1,5 +1,5 @@
-"""The theorem about the loop that flies: the torque is held between samples, torques from outside and errors of the command
-are bounded, and motions from a large set come as near to the target as is told. Proof: docs/kernel.md, section 10."""
+"""The theorem about the loop that flies: the torque is held between samples, external torques and errors of the command are
+bounded, and motions from a large set come as near to the target as stated. Proof: docs/kernel.md, section 10."""
 
 from __future__ import annotations
 
@@ -37,36 +37,38 @@ from .noise import DEVIATION, SHARE, within_radii
 from .response import first_of, responds
 
 ROUNDS = 64
-"""How often responses may be taken, each in the set that was found before."""
+"""How often responses may be taken, each in the set that the one before leads to."""
 
 NEARLY = Fraction(9, 8)
-"""How near to what it comes down to is counted what is late."""
+"""The late torque's error counts as settled within this factor of its limit."""
 SLIGHT = 1 << 14
-"""By how much what is late near the target is larger than what is left of that in larger sets, to be forgotten."""
+"""The error of a late torque near the target, relative to what is left there of that in larger sets once this is
+forgotten."""
 
 HALF_TURN = Fraction(314, 100)
-"""At most a half turn (rad)."""
+"""Just below a half turn (rad)."""
 
 
 def points(claim: Claim) -> Proof:
-    """Every motion from {V <= level} has V <= highest at all times, and after the time `settling` it is at all times turned
-    by no more than end.angle and turns no faster than end.rate. The torque is what the law asks for at the last sample and
-    an error, |error| <= error; it is told the attitude turned by error.attitude at most, the rate off by error.rate, and
-    the target's rate and acceleration off by error.target.rate and error.target.acceleration;
-    torques from outside that it is not told are no more than `outside`. Both may grow by `.per.rate` times the body's rate.
-    The torque that it is told may turn over at once; with told.change it is that at the attitude that it is told, and
-    changes no faster than that and told.change.per.rate times the body's rate.
-    With a `share` all holds at so many `samples` on end but with this probability: errors that noise drives are no more than
-    noise.attitude and noise.rate beside. The law may keep a memory that adds a torque of no more than `memory` about each
-    axis, whatever is in it. With a `tolerance` the inertia is one near the given one. The law may ask for
-    the first move of a plan, see `plans`."""
+    """Every motion from {V <= level} has V <= highest at all times; after the time `settling` its rotation is at all times
+    at most end.angle and its rate at most end.rate. The torque is the law's command at the last sample plus an error,
+    |error| <= error. Errors of the law's inputs are at most error.attitude and error.rate, and for the target's rate and
+    acceleration error.target.rate and error.target.acceleration; external torques that the law does not know are at most
+    `outside`. `error` and `outside` may grow by `.per.rate` times the body's rate.
+
+    The external torque that the law knows may reverse at once; with told.change it is the one at the measured attitude, and
+    changes no faster than that plus told.change.per.rate times the body's rate. With a `share` all of this is true at so
+    many `samples` on end except with this probability: errors that noise drives add at most noise.attitude and noise.rate.
+    The law may keep a memory, whatever it contains, that adds a torque of at most `memory` about each axis. With a
+    `tolerance` the inertia is any one near the given one. The law may command the first move of a plan, see `plans`.
+    """
     loop = AttitudeLoop(claim, remembers=True)
     yield from loop.sound()
     motion, numbers, samples = Held(loop), claim.numbers, 0
     c, h = numbers["level"], motion.h
     starts = [numbers.get(name) or Fraction(0) for name in ("angle", "start.angle")]
     demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
-    # What is late is in the set from the beginning.
+    # The late torque's error is in the set from the beginning.
     behind = motion.late.weight * motion.late.begun**2 if motion.late else Fraction(0)
     demand(behind < c or not behind, "what is late in the beginning is beyond the level")
     start = yield from contents(loop, loop.lyapunov + behind)
@@ -79,7 +81,7 @@ def points(claim: Claim) -> Proof:
     off = motion.misread(region)[0] + motion.planned(region.sizes)
     behind_at_most = motion.behind(region.sizes).most
     if WITHIN in numbers or not motion.inexact:
-        # Its components change one by one, not towards what is asked for.
+        # Its components change one by one, not towards the command.
         off += behind_at_most
     if WITHIN in numbers:
         yield "torque that follows", Exceeds(numbers[WITHIN], behind_at_most)
@@ -94,12 +96,12 @@ def points(claim: Claim) -> Proof:
     if SHARE in numbers:
         noise = yield from within_radii(claim, motion)
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
-    demand(bool(levels), "no level is told")
+    demand(bool(levels), "no level is stated")
     within = [(Fraction(0), tube.sizes[ANGLE])]
     for k, one in enumerate(levels):
         end, tau, beta = map(rational, read_table(one, "end", "tau", "beta"))
         Q, H, F, push, rest, spare = motion.fall(tube)
-        demand(tau > 0 and 0 < h * beta <= spare and 0 < end < c, "a level is not properly told")
+        demand(tau > 0 and 0 < h * beta <= spare and 0 < end < c, "a level is not properly stated")
         pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(F), F), -tau), H, -beta)
         yield f"V decreases by a share {k}", Definite(fallen)
@@ -122,7 +124,7 @@ def points(claim: Claim) -> Proof:
             map(rational, rest),
         )
         free = 1 - sum(shares, Fraction(0))
-        demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
+        demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly stated")
         left = plus([[rate * x for x in row] for row in X], spread(shares, motion.linear(tube)), -1)
         for corner, A in enumerate(corners):
             yield f"ellipsoid {k} {corner}", Definite(plus(left, times(A, times(X, transpose(A))), Fraction(-1) / free))
@@ -184,7 +186,7 @@ def points(claim: Claim) -> Proof:
 
 
 def with_motion(motion: Held) -> str:
-    """Return what a claim says of errors that grow with the motion."""
+    """Return what a claim says about measurement errors that grow with the motion."""
     text, of = "", (("rad/s", "rate"), ("rad/s2", "acceleration"))
     for name, unit, sizes in zip(("attitude", "rate"), ("rad", "rad/s"), motion.moving, strict=True):
         grown = zip(sizes, of, strict=True)
@@ -195,8 +197,8 @@ def with_motion(motion: Held) -> str:
 
 
 def bounded_motion(numbers: Numbers, begun: str, more: str, misread: Sequence[tuple[str, Fraction, str]]) -> str:
-    """Return what a claim says of motions from a set while the torque is held. misread: of what the law is told its name, by
-    how much it is off at most, and the unit of that."""
+    """Return what a claim says about motions from a set while the torque is held. misread: for each input of the law its
+    name, the largest error, and its unit."""
 
     def most(name: str) -> str:
         growing = numbers.get(f"{name}.per.rate")
@@ -215,8 +217,8 @@ def bounded_motion(numbers: Numbers, begun: str, more: str, misread: Sequence[tu
 
 
 def spread(shares: Sequence[Fraction], pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:
-    """Return what the sum of B v, |v| <= b, adds to the matrix AXA' / (1 - the sum of shares) of an ellipsoid that holds
-    Ax + that, of x.X^-1 x <= 1."""
+    """Return what the sum of B v, |v| <= b, adds to AXA' / (1 - the sum of shares), so that the ellipsoid of the result,
+    x.X^-1 x <= 1, contains Ax + that sum."""
     grown = scalar(0, len(pushes[0][0]))
     for (B, b), share in zip(pushes, shares, strict=True):
         grown = plus(grown, times(B, transpose(B)), b * b / share)
@@ -224,8 +226,8 @@ def spread(shares: Sequence[Fraction], pushes: Sequence[tuple[Rows, Fraction]]) 
 
 
 def on_level(motion: Held, c: Fraction, before: Tube | None = None) -> tuple[Tube, int]:
-    """Return the tube of a level from when what was late before is forgotten, and after how many periods that is. before:
-    the tube in which motions came there."""
+    """Return the tube of a level once the late torque's earlier error is forgotten, and the number of periods until then.
+    before: the tube in which motions came there."""
     tube = motion.tube(motion.region(c))
     samples = waited(motion, before, tube) if before else 0
     for _ in range(2 * bool(motion.late)):
@@ -235,8 +237,8 @@ def on_level(motion: Held, c: Fraction, before: Tube | None = None) -> tuple[Tub
 
 
 def forgotten(motion: Held, tube: Tube, near: bool = True) -> tuple[Tube, int]:
-    """Return the tube from when what was late in larger sets is forgotten, or the b of it, and after how many periods that
-    is."""
+    """Return the tube once the late torque's error in larger sets, or its part b, is forgotten, and the number of periods
+    until then."""
     if (late := motion.late) is None:
         return tube, 0
     sizes = tube.region.sizes
@@ -256,8 +258,8 @@ def forgotten(motion: Held, tube: Tube, near: bool = True) -> tuple[Tube, int]:
 
 
 def waited(motion: Held, before: Tube, after: Tube) -> int:
-    """Return after how many periods in the region of a tube what the law is told is off by no more than there, as that is
-    forgotten which the body did in the tube before."""
+    """Return the number of periods in the region of a tube until measurement errors are within their bounds there, while the
+    effect of the motion in the tube before is forgotten."""
     if not motion.grows:
         return 0
     amiss, end = ([tube.region.sizes[x] for x in AMISS] for tube in (before, after))
@@ -271,8 +273,8 @@ def waited(motion: Held, before: Tube, after: Tube) -> int:
 
 
 def periods(fall: Fraction, floor: Fraction, start: Fraction, end: Fraction) -> int:
-    """Return after how many periods a number is below `end` that in each comes down to (1 - fall) x + fall floor at most:
-    (1 - fall)^n <= (1 + fall n / 64)^-64."""
+    """Return the number of periods until x is below `end`, where each makes it at most (1 - fall) x + fall floor: (1 -
+    fall)^n <= (1 + fall n / 64)^-64."""
     if start <= end:
         return 0
     ratio = up((start - floor) / (end - floor))

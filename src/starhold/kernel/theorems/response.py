@@ -1,5 +1,5 @@
-"""How far bounded pushes take the linear motion near a target: by sums of its impulse response. Proof: docs/kernel.md,
-sections 10 and 12."""
+"""Bounds of the linear motion near a target under bounded disturbances, by sums of its impulse response. Proof:
+docs/kernel.md, sections 10 and 12."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from ..regions import ANGLE, RATE, SPEED, STATE, TURN, Radii, Tube, stretch
 from ..rules import Definite, Part
 
 PLACES, MOST = 80, 6000
-"""The places after the point of responses, and how many samples they may take."""
+"""The binary places of responses, and the most samples that they may take."""
 PARTS = {"rate": RATE, "turn": TURN, "acceleration": slice(6, 9)}
 KINDS = (0, 1), (1,), (2,)
 Sparse = list[list[tuple[int, int]]]
@@ -38,8 +38,8 @@ Sparse = list[list[tuple[int, int]]]
 
 @dataclass(frozen=True)
 class Response:
-    """So many samples of z+ = Az + the sum of B v, |v| <= b: how large parts of what is bounded become for b = 1, of each
-    kind of pushes, what is left of the first sample, and how large, row by row, what else each sample adds makes it."""
+    """So many samples of z+ = Az + the sum of B v, |v| <= b: the gains of the bounded parts from each kind of disturbance
+    with b = 1, what is left of the first sample, and the gains, row by row, from anything else that each sample adds."""
 
     count: int
     gains: list[list[Fraction]]
@@ -47,9 +47,9 @@ class Response:
     beside: Rows
 
     def after(self, motion: Held, tube: Tube, begun: Radii, pulled: Fraction) -> tuple[Radii, Fraction, Tube]:
-        """Return |w| and |q| of z after these samples in the tube's region, its acceleration, and the tube from there on:
-        from what they were before. Kinds of pushes are the first two B together, the second, and the third. What momentum
-        makes of z is a push here."""
+        """Return |w| and |q| of z after these samples in the tube's region, its acceleration, and the tube from there on,
+        given what they were before. Kinds of disturbances are the first two B together, the second, and the third. The
+        effect of momentum on z is a disturbance here."""
         away, swayed, region_sizes = motion.away, motion.swayed, tube.region.sizes
         first, last, turn = (b for _, b in motion.linear(tube, begun[0], pulled))
         pushes = first, max(last - first, Fraction(0)), turn
@@ -70,8 +70,8 @@ def first_of(motion: Held, tube: Tube) -> tuple[Radii, Fraction]:
 
 
 def responds(motion: Held, weights: Any, gains: Any) -> Part[Response]:
-    """The gains are no less than those of the loop, of its rates, its turn and the acceleration that is linear in both."""
-    # What C_0 is of (w, q): the torque that acts late is in none of them.
+    """The gains bound those of the loop: of its rates, its turn and the linear acceleration."""
+    # C_0 acts on (w, q): the late torque is in none of the bounded parts.
     rows = [row + [Fraction(0)] * (len(motion.near.A) - len(STATE)) for row in scalar(1, 6) + motion.near.rates]
     return summed(rows, PARTS, motion.near.A, motion.ways, KINDS, weights, gains)
 
@@ -85,9 +85,9 @@ def summed(
     weights: Any,
     gains: Any,
 ) -> Part[Response]:
-    """The gains are no less than those of z+ = Az + the sum of B v. kinds: of each kind of pushes the places of its B, of
-    three columns. weights: m_k, for each part of what is bounded. Of the sum x of C_k B v_k (y.x)^2 is no more than the sum
-    of 1/m_k times that of m_k |B'C_k'y|^2 (Cauchy and Schwarz)."""
+    """The gains bound those of z+ = Az + the sum of B v. kinds: for each kind of disturbance the places of its B, of three
+    columns each. weights: m_k, for each bounded part. For the sum x of C_k B v_k, (y.x)^2 is at most the sum of 1/m_k times
+    the sum of m_k |B'C_k'y|^2 (Cauchy and Schwarz)."""
     (moved, below), (B, under) = columns(A), columns(reduce(beside, ways))
     count = len(read_list(read_list(weights, len(parts))[0]))
     demand(0 < count <= MOST, "a response has no samples, or too many")
@@ -108,7 +108,7 @@ def summed(
                 for x, row in zip(total, block, strict=True):
                     x[:] = [y + m * sum(map(mul, row, other)) for y, other in zip(x, block, strict=True)]
         rows = carried(rows, moved, below)
-    # What is rounded off, in each entry, all the while.
+    # The accumulated rounding error of each entry.
     off = Fraction(count + 1, 1 << PLACES)
     for name, chosen, totals, gained in zip(parts, weighed, sums, most, strict=True):
         share = Fraction(sum(-(-(1 << PLACES) // m) for m in chosen), 1 << 3 * PLACES)

@@ -48,8 +48,7 @@ class Params(NamedTuple):
         ZERO
     )
     pulses: Annotated[
-        int,
-        Parameter(choices=("modulated", "whole"), text="as long as commanded, or a whole control period"),
+        int, Parameter(choices=("modulated", "whole"), text="as long as commanded, or a whole control period")
     ] = 0
     lever: Annotated[float, Parameter("m", above=0.0, text="arm of a thruster about its axis")] = 1.0
     specific_impulse: Annotated[float, Parameter("s", above=0.0, text="of the propellant")] = 220.0

@@ -11,12 +11,7 @@ from starhold.algebra.vector import Vector
 from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 
-CARD = Card(
-    title="Constant torque",
-    summary="M = constant",
-    sources=("definition",),
-    assumptions=("unknown to all laws",),
-)
+CARD = Card(title="Constant torque", summary="M = constant", sources=("definition",), assumptions=("unknown to all laws",))
 ROLE = "environment"
 
 

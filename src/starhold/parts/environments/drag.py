@@ -51,10 +51,7 @@ TURN = math.tau * SIDEREAL / DAY
 class Params(NamedTuple):
     """The plates, and the air; by default that of a quiet day between 500 and 600 km."""
 
-    plates: Annotated[
-        tuple[Row, ...],
-        Parameter("m^2, 1, 1, 1, m, m, m", columns=COLUMNS, text=TEXT),
-    ]
+    plates: Annotated[tuple[Row, ...], Parameter("m^2, 1, 1, 1, m, m, m", columns=COLUMNS, text=TEXT)]
     coefficient: Annotated[float, Parameter("1", at_least=0.0, text="of drag, of each plate")] = 2.2
     density: Annotated[float, Parameter("kg/m^3", at_least=0.0, text="at the reference height")] = 6.967e-13
     height: Annotated[float, Parameter("m", text="of reference, above the equatorial radius")] = 5e5

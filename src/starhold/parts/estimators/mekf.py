@@ -14,31 +14,13 @@ from starhold.algebra.quaternion import NO_TURN, Quaternion
 from starhold.algebra.scalar import Scalar, both, either, less, less_equal, maximum, where
 from starhold.algebra.structure import chosen
 from starhold.algebra.structured import when
-from starhold.algebra.vector import (
-    ZERO,
-    Matrix,
-    Vector,
-    add,
-    along_axis,
-    apply,
-    diagonal,
-    inverse,
-    most,
-    scale,
-    subtract,
-)
+from starhold.algebra.vector import ZERO, Matrix, Vector, add, along_axis, apply, diagonal, inverse, most, scale, subtract
 from starhold.algebra.vector import multiply as product
 from starhold.parts import vectors
 from starhold.parts.attitudes import attitudes_of, together
 from starhold.parts.boresight import unit_boresight
 from starhold.parts.contract import FIX, Card, Noise, Parameter, Recursion
-from starhold.parts.covariance import (
-    GYRO_BIAS,
-    GYRO_NOISE,
-    GYRO_WALK,
-    deviations,
-    summed,
-)
+from starhold.parts.covariance import GYRO_BIAS, GYRO_NOISE, GYRO_WALK, deviations, summed
 from starhold.parts.craft import Craft
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, Date

@@ -22,11 +22,7 @@ from starhold.parts.epoch import EPOCH, START, Date
 CARD = Card(
     title="TRIAD",
     summary="A = [s, u, s x u] measured times [s, u, s x u] computed, transposed, with u = unit(s x B)",
-    sources=(
-        "A passive system for determining the attitude of a satellite (1964)",
-        *sun.SOURCES,
-        magnetic_field.SOURCE,
-    ),
+    sources=("A passive system for determining the attitude of a satellite (1964)", *sun.SOURCES, magnetic_field.SOURCE),
     assumptions=(
         *magnetic_field.ASSUMPTIONS,
         "the Sun is better known than the field: its direction is kept, and of the field only the plane through both",

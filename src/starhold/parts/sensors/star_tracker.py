@@ -67,9 +67,8 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Standard deviations (rad), unit vector of the boresight, control steps from update to update, delay, and control
-    steps of the outage; the blinding cones, the squared rate limit (rad2/s2) and the rotation of its mounting, () for
-    none."""
+    """Standard deviations (rad), unit vector of the boresight, control steps from update to update, delay, and control steps
+    of the outage; the blinding cones, the squared rate limit (rad2/s2) and the rotation of its mounting, () for none."""
 
     cross: Scalar
     roll: Scalar

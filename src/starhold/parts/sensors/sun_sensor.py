@@ -22,12 +22,7 @@ CARD = Card(
     title="Sun sensor",
     summary="s_m = unit(s + noise) where s is within half_angle of the boresight and half of the Sun is in view, else 0",
     sources=(*sun.SOURCES, "Fundamentals of Spacecraft Attitude Determination and Control (2014)"),
-    assumptions=(
-        *sun.ASSUMPTIONS,
-        sun.SHADOW,
-        "no light from the Earth",
-        "white noise from control step to control step",
-    ),
+    assumptions=(*sun.ASSUMPTIONS, sun.SHADOW, "no light from the Earth", "white noise from control step to control step"),
 )
 ROLE = "sensor"
 NEEDS = ("two-body",)
@@ -41,8 +36,7 @@ class Params(NamedTuple):
     noise: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis")] = 0.0
     boresight: Annotated[Vector, BORESIGHT] = THIRD
     half_angle: Annotated[
-        float,
-        Parameter("rad", above=0.0, at_most=math.pi, text="of the field of view; half a turn sees all"),
+        float, Parameter("rad", above=0.0, at_most=math.pi, text="of the field of view; half a turn sees all")
     ] = math.pi
     epoch: Annotated[Date, EPOCH] = START
     outage: Annotated[Window, OUTAGE] = NEVER

@@ -118,10 +118,9 @@ def nadir(orbit: Orbit, least: float) -> Iterator[tuple[Turning, float]]:
 
 
 class Seen(NamedTuple):
-    """A place is seen from a craft: how far it is at least (m), between which sines of its angle to the craft's
-    vertical, and the most of that to its own; the speed of the craft, its part along the vertical, and that of the place
-    (m/s); and the largest acceleration across the line (m/s2) with how much of it is not known. Speeds are at most so
-    large."""
+    """A place is seen from a craft: how far it is at least (m), between which sines of its angle to the craft's vertical,
+    and the most of that to its own; the speed of the craft, its part along the vertical, and that of the place (m/s); and
+    the largest acceleration across the line (m/s2) with how much of it is not known. Speeds are at most so large."""
 
     distance: float
     least: float

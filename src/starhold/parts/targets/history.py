@@ -36,8 +36,7 @@ class Knots(NamedTuple):
 
 
 class Params(NamedTuple):
-    """A table of `tabulate` with a row for each control step and one more, and the knots of its spline (() if not
-    known)."""
+    """A table of `tabulate` with a row for each control step and one more, and the knots of its spline (() if not known)."""
 
     table: NDArray[np.float64]
     knots: Knots | tuple[()] = ()

@@ -1,5 +1,4 @@
-"""The orbital frame: third axis to the centre of attraction, second opposite to the orbit normal, first along the
-motion."""
+"""The orbital frame: third axis to the centre of attraction, second opposite to the orbit normal, first along the motion."""
 
 from __future__ import annotations
 

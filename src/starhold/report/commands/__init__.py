@@ -46,8 +46,7 @@ class Cell(NamedTuple):
     """Styled text in a table. kind: "law", in the colour of the law of this number; "name", which names its row, with detail
     below it; an outcome, such as "met" or "missed"; "best" of its column; "typed", to be copied; "section", a link to the
     section of a document that detail names; "share", with a bar below it for this share of the column's width; "shade", in
-    the colour that detail names, whose strength depends on the number; for any other kind detail explains the text.
-    """
+    the colour that detail names, whose strength depends on the number; for any other kind detail explains the text."""
 
     text: str
     kind: str = ""
@@ -156,8 +155,7 @@ class Command(NamedTuple):
     blocks shown without FILE, if that is allowed. read: returns the subject in place of a scenario and a law, from FILE and
     options. proofs: whether a certificate is written and --rocq exists. kinds: suffixes of the files NAME.*. prove: the
     study together with a proof of the pointing bound, if --proof exists. check: takes the arguments of study and refuses
-    files that they name before a folder for results is opened.
-    """
+    files that they name before a folder for results is opened."""
 
     summary: str
     suffix: str

@@ -30,8 +30,7 @@ class Made(Protocol):
 
 class Moved(NamedTuple):
     """The numbers of a loop for given values of a file's keys: the body's state when its motion begins and when the loop is
-    made, the craft that flies, the law's nominal model, the saturation limit of the command, and the loop's parts.
-    """
+    made, the craft that flies, the law's nominal model, the saturation limit of the command, and the loop's parts."""
 
     start: Any
     made_with: Any

@@ -95,8 +95,7 @@ class Resources(Table):
         float | None, *quantity(Gain("1", at_least=0.0, text="share by which the limit exceeds the circle's peak demand"))
     ] = None
     deficit: Annotated[
-        float | None,
-        *quantity(Gain("1", at_least=0.0, at_most=0.99, text="share by which the limit is below that demand")),
+        float | None, *quantity(Gain("1", at_least=0.0, at_most=0.99, text="share by which the limit is below that demand"))
     ] = None
     lag: Annotated[float | None, *scaled("time", Gain("s", at_least=0.0, text="time constant of the control surfaces"))] = (
         None
@@ -143,10 +142,7 @@ class PointTiming(Timing):
     record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps per recorded sample"))] = 10
     lost_beyond: Annotated[
         float | None,
-        *scaled(
-            "length",
-            Gain("m", above=0.0, text="divergence bound on the distance; 0.4 of the nearer body's if absent"),
-        ),
+        *scaled("length", Gain("m", above=0.0, text="divergence bound on the distance; 0.4 of the nearer body's if absent")),
     ] = None
 
 

@@ -138,11 +138,10 @@ def make(table: RigidBodyTable, where: str) -> Made:
 
 def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
     """Return the effectors of a scenario's tables, which allocate a torque by the law's model of them. Beside the functions
-    of its role, each has `sure_torque(params, kind)`, the torque (N m) that it can always give, in norm or about all axes
-    at once; `capacity(own, params)`, the momentum (N m s) that it can still store; `axial_inertia(params)`, the part of the
+    of its role, each has `sure_torque(params, kind)`, the torque (N m) that it can always give, in norm or about all axes at
+    once; `capacity(own, params)`, the momentum (N m s) that it can still store; `axial_inertia(params)`, the part of the
     body's inertia (3, 3; kg m2) due to its rotors about their spin axes; and `shared_as(params, known, like)`, its
-    parameters with the allocation that a law computes from the parameters it knows.
-    """
+    parameters with the allocation that a law computes from the parameters it knows."""
     made, supposed = (cast(Made, one.made).effectors for one in (scenario, scenario.known))
     if made is supposed or len(made) != len(supposed):
         return made

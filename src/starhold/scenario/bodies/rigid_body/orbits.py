@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,8 @@ def orbits_over(scenario: Scenario, columns: Mapping[str, Array]) -> list[Orbit]
             whole[int(component[:-1]) - 1] = values
         else:
             changes[name] = values
-    rows = zip(*(map(_plain, values.T.tolist()) for values in changes.values()), strict=True)
+    lists = ([tuple(x) if isinstance(x, list) else x for x in values.T.tolist()] for values in changes.values())
+    rows = zip(*lists, strict=True)
     return [orbit.model_copy(update=dict(zip(changes, row, strict=True))) for row in rows]
 
 
@@ -50,10 +51,6 @@ def _may_differ(orbit: Orbit, name: str, values: Array) -> bool:
     if name in SHAPE and orbit.position is None:
         return name != "eccentricity" or orbit.altitude is None
     return name in STATE and getattr(orbit, name) is not None
-
-
-def _plain(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
 
 
 def impossible_orbits(scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:

@@ -124,10 +124,11 @@ class Pointing(Table):
 class Initial(Pointing):
     """Attitude and rate at the start, in the inertial frame or relative to the target."""
 
-    rate: Annotated[
-        Any,
-        *quantity(Gain("rad/s", shape=(3,), spread=False, text="angular velocity, body axes")),
-    ] = (0.0, 0.0, 0.0)
+    rate: Annotated[Any, *quantity(Gain("rad/s", shape=(3,), spread=False, text="angular velocity, body axes"))] = (
+        0.0,
+        0.0,
+        0.0,
+    )
     relative_to: Annotated[
         Literal["inertial", "target"], Field(description="frame to which attitude and rate are relative")
     ] = "inertial"
