@@ -1,5 +1,5 @@
-"""What the kernel checked, printed for Rocq, which checks it again by rules that it has proved itself: those of all tests are
-proved once, and so is a lemma that several certificates have."""
+"""What the kernel checked, printed for Rocq, which checks it again by rules that it has proved itself, once for all tests, as
+it does a lemma that several certificates have."""
 
 import re
 import shutil
@@ -25,7 +25,7 @@ LIBRARY = {"ClassicalDedekindReals.sig_forall_dec", "FunctionalExtensionality.fu
 
 
 RULES = resources.files("starhold.certification").joinpath("rocq.v").read_text(encoding="utf-8")
-PROVED = "From Coq Require Import Reals ZArith List Lra Lia Bool.\nRequire Import rules.\nImport ListNotations.\nOpen Scope R_scope.\n"
+PROVED = "From Coq Require Import Reals ZArith List.\nRequire Import rules.\nImport ListNotations.\nOpen Scope R_scope.\n"
 """What stands in place of the rules where they are proved already."""
 LEMMA = re.compile(r"^(?:Definition (claim\w+)_evidence := .*\n)?Lemma (claim\w+) :(?:.*\n)*?Qed\.\n", re.MULTILINE)
 
