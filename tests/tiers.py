@@ -22,12 +22,18 @@ def leading(cases, count=1):
     return [pytest.param(*values, marks=() if place < count else pytest.mark.slow) for place, values in enumerate(given)]
 
 
-def drawn(cases, count, first=1):
-    """Parameters of a test whose cases are a product, or a search that found all it would find in these very cases: `make
-    test` tries the first ones, `make test-all` so many others besides, which differ from day to day."""
+def of_the_day(cases, count):
+    """So many of some cases, in their order, which differ from day to day."""
     cases = [*cases]
-    others = random.Random(f"{SEED} {len(cases)}").sample(range(first, len(cases)), min(count, len(cases) - first))
-    return leading([*cases[:first], *(cases[k] for k in sorted(others))], first)
+    places = random.Random(f"{SEED} {len(cases)}").sample(range(len(cases)), min(count, len(cases)))
+    return [cases[k] for k in sorted(places)]
+
+
+def drawn(cases, count, first=1):
+    """Parameters of a test whose cases are a product: `make test` tries the first ones, `make test-all` so many others
+    besides, which differ from day to day."""
+    cases = [*cases]
+    return leading([*cases[:first], *of_the_day(cases[first:], count)], first)
 
 
 def seeds(count):

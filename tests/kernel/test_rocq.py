@@ -1,5 +1,4 @@
-"""What the kernel checked, printed for Rocq, which checks it again by rules that it has proved itself, once for all tests, as
-it does a lemma that several certificates have."""
+"""What the kernel checked, printed for Rocq, which checks it again by rules that it has proved itself."""
 
 import re
 import shutil
