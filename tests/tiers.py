@@ -36,6 +36,11 @@ def drawn(cases, count, first=1):
     return leading([*cases[:first], *of_the_day(cases[first:], count)], first)
 
 
+def source(name):
+    """A source of random numbers for a test: `make test` has the same each day, `make test-all` another."""
+    return random.Random(f"{name} {SEED}" if WHOLE else name)
+
+
 def seeds(count):
     """Seeds of random examples that differ from day to day."""
     begin = int.from_bytes(random.Random(SEED).randbytes(3))
