@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -96,8 +97,8 @@ def point_loop(
 
 
 def built(scenario: Any, law: str | None = None) -> ClosedLoop:
-    """The loop of a scenario, or of the built-in one of this name, with this law, or with its first."""
-    scenario = load(scenario) if isinstance(scenario, str) else scenario
+    """The loop of a scenario, or of the one of this name or in this file, with this law, or with its first."""
+    scenario = load(scenario) if isinstance(scenario, str | Path) else scenario
     return build(scenario, scenario.pick(law))
 
 

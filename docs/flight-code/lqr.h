@@ -16,7 +16,7 @@
 
    Program of the law: sha256 851ab1c92f50234498ca20e7141e8ad0edc5898615f514d663a47b1df0e15661
 
-   Certificate: certificate.json, sha256 d93f9732354f010d66fdb5f8928f309541f282cea50d79af590982ae5d379e57:
+   Certificate: certificate.json, sha256 f1625c8eb7458494ff65d2a6337fd7600b30134f589fd2f7eac33467bf78e5e1:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on
@@ -27,8 +27,8 @@
      entry of the inertia off by up to 100 % of sqrt(J_ii J_jj)
      proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
      every period up to 19.99 s
-     proved: pointing as it flies: within 0.02185° of the target after 1294 s at all times, from rest at up
-     to 20°, torque held for 0.1 s, with torques from outside of up to 3.486e-06 N m
+     proved: pointing as it flies: within 0.02184° of the target after 705.4 s at all times, from rest at
+     up to 25°, torque held for 0.1 s, with torques from outside of up to 3.486e-06 N m
    These claims assume: rigid body; exact measurement and ideal actuators; inertia exactly as given; no
    torque from outside; torque applied continuously; torque not limited; inertia within the tolerance;
    linear motion near rest on a target at rest; torques from outside and errors of the command are no

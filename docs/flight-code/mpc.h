@@ -16,15 +16,15 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 e915b18445ee4483c54af52e21f7117d4e8555adfa7a84eacdc51d28ee8415a9:
+   Certificate: certificate.json, sha256 e706f2323a3ead15fa68c8576674d2f343ccdd7bbaa06e46c642cf89c5098fbb:
    proved
    Claims:
-     proved: pointing as it flies: within 0.007201° of the target after 638 s at all times, from rest at up
-     to 10°, torque held for 0.1 s, with torques from outside of up to 3.486e-06 N m and a plan within
-     4.939e-05 N m of a polynomial
+     proved: pointing as it flies: within 0.007201° of the target after 487.1 s at all times, from rest at
+     up to 12°, torque held for 0.1 s, with torques from outside of up to 3.486e-06 N m and a plan within
+     7.117e-05 N m of a polynomial
    These claims assume: rigid body; inertia exactly as given; torques from outside and errors of the
    command are no larger than told; the torque is what the law asks for at the last sample, and the error;
-   torque of a plan as told, of nearly the least cost.
+   torque of a plan as stated, of nearly the least cost.
    Check it independently: starhold check certificate.json */
 
 #ifndef MPC_H

@@ -42,23 +42,13 @@ def claimed(seed, tolerance, kind):
     return proved_loop(seed, Path(), tolerance, kind)[2]
 
 
-def flown_again(seed, kind, tolerance, way, share):
+@pytest.mark.parametrize(("seed", "kind", "tolerance", "way", "share"), leading([*QUICK, *LONG], len(QUICK)))
+def test_the_worst_flight_of_a_random_loop_ends_within_its_bound(seed, kind, tolerance, way, share):
     claim = claimed(seed, tolerance, kind)
     end = np.array(way)[:, None] / np.linalg.norm(way)
     worst = Steered(*given(claim), 1, 1, 4000).fly(end)
     assert share - 0.002 < worst.angle <= 1.0
     assert worst.rate <= 1.0
-
-
-@pytest.mark.parametrize(("seed", "kind", "tolerance", "way", "share"), QUICK)
-def test_the_worst_flight_of_a_random_loop_ends_within_its_bound(seed, kind, tolerance, way, share):
-    flown_again(seed, kind, tolerance, way, share)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("seed", "kind", "tolerance", "way", "share"), leading(LONG))
-def test_the_worst_flight_of_another_loop_ends_within_its_bound(seed, kind, tolerance, way, share):
-    flown_again(seed, kind, tolerance, way, share)
 
 
 def test_noise_is_chosen_against_a_claim():

@@ -1,14 +1,10 @@
 """What a file of certificates says is checked: kinds and proofs of its claims, its outcome, digests of its programs."""
 
 import copy
-import json
 
 import pytest
 
-from starhold.kernel.check import check as prove
-from starhold.kernel.numbers import RefusedError
 from tests.certification.edits import claims_of, reasons, with_kinds
-from tests.kernel.certificates import contents
 
 
 @pytest.fixture
@@ -36,11 +32,3 @@ def test_beside_a_loop_that_points_as_it_flies_undecided_claims_do_not_count(con
     assert (wrong in reasons(with_kinds(content))) != pointing
     content["certificates"][0]["outcome"] = "undecided"
     assert (wrong in reasons(with_kinds(content))) == pointing
-
-
-def test_a_program_under_the_digest_of_another_one_is_refused():
-    content = contents("three-laws", "sliding")
-    one, other, *_ = content["programs"]
-    content["programs"][one] = content["programs"][other]
-    with pytest.raises(RefusedError, match="a program is another one than its digest says"):
-        prove(json.dumps(content))

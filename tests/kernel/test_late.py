@@ -93,8 +93,7 @@ def test_a_lag_that_makes_the_loop_unstable_is_left_out_by_name():
 
 
 @pytest.mark.parametrize(
-    ("name", "factor"),
-    [("rest", 0.5), ("weight", 0.1), ("weight", 10.0), ("begun", 30.0), ("kept", 7.0), ("mean", 2.3)],
+    ("name", "factor"), [("rest", 0.5), ("weight", 0.1), ("weight", 10.0), ("begun", 30.0), ("kept", 7.0), ("mean", 2.3)]
 )
 def test_the_kernel_refuses_other_numbers_with_the_evidence(name, factor):
     _, claim, _ = flying("lag", 0.05)

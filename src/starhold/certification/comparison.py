@@ -20,14 +20,7 @@ from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
 from starhold.certification.measured import driven_errors
 from starhold.certification.subject import make_subject
-from starhold.certification.unmodelled import (
-    GROWING,
-    Pushes,
-    change_of_modelled,
-    late_torque,
-    noisy_fields,
-    samples_of,
-)
+from starhold.certification.unmodelled import GROWING, Pushes, change_of_modelled, late_torque, noisy_fields, samples_of
 from starhold.kernel.follower import KNOWN, LATE
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, TOLD_TORQUE, WHEELS

@@ -273,12 +273,7 @@ def _slid(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]
 
 def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     angle, rate = (below(numbers.get(f"start.{name}", numbers.get(name, Fraction(0)))) for name in ("angle", "rate"))
-    most = {
-        "torque": "outside",
-        "error": "error",
-        "torque_per_rate": "outside.per.rate",
-        "error_per_rate": "error.per.rate",
-    }
+    most = {"torque": "outside", "error": "error", "torque_per_rate": "outside.per.rate", "error_per_rate": "error.per.rate"}
     errors = {
         f"{name}_error": sum(float(numbers.get(f"{kind}.{name}", 0)) for kind in ("error", "noise"))
         for name in ("attitude", "rate")

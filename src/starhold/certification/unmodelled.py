@@ -108,7 +108,7 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     for fitted in _acting(loop):
         for pushed, push in zip((torques, errors), _pushes(fitted, envelope), strict=True):
             pushed += [] if push is None else [push]
-    attitude, rate, *more = reduce(Told.__add__, [amiss for _, amiss in _told(loop)], Told())
+    attitude, rate, *more = reduce(Told.__add__, [errors for _, errors in _told(loop)], Told())
     (torque, per_rate), (command, command_per_rate) = (
         [sum(x) for x in zip(*pushed, strict=True)] for pushed in (torques, errors)
     )
@@ -122,17 +122,17 @@ def _told(loop: ClosedLoop) -> list[tuple[tuple[Fitted, ...], Told]]:
     """Return the measurement errors besides noise, with the parts that they come from."""
     result = measured(loop)
     together = () if result is None else result.parts
-    amiss = [] if result is None else [(together, result.amiss)]
+    misread = [] if result is None else [(together, result.amiss)]
     for f in _acting(loop):
         # A part that is left out for its noise is left out with its other errors.
         errors = None if f in together or is_random(noise_of(f, loop.period)) else bounded(f, loop.period)
-        amiss += [] if errors is None else [((f,), as_read(errors))]
-    return amiss
+        misread += [] if errors is None else [((f,), as_read(errors))]
+    return misread
 
 
 def grows(loop: ClosedLoop) -> bool:
     """Whether measurement errors grow as the body moves."""
-    return any(amiss.grows for _, amiss in _told(loop))
+    return any(errors.grows for _, errors in _told(loop))
 
 
 def late_torque(loop: ClosedLoop) -> Late | None:
@@ -206,7 +206,7 @@ def assumed_away(loop: ClosedLoop) -> list[str]:
 
 def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple[Claim, ...]:
     """Return the claims with an assumption for each part that they leave out."""
-    away, driven, amiss = assumed_away(loop), driven_errors(loop), _told(loop)
+    away, driven, misread = assumed_away(loop), driven_errors(loop), _told(loop)
 
     def more(claim: Claim) -> tuple[str, ...]:
         if claim.kind == DETUMBLING and claim.outcome == "proved":
@@ -220,9 +220,9 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         there = (*noisy, *moved, *(_moving(loop) if claim.numbers.get("late_torque") else ()))
         grown = "told_growth" in claim.numbers
         # Parts whose errors grow are left out unless the claim includes the growth, and noisy ones unless it includes noise.
-        left = [f for parts, one in amiss if one.grows and not grown for f in parts]
+        left = [f for parts, one in misread if one.grows and not grown for f in parts]
         left += [] if driven is None or noisy else driven.parts
-        telling = [f for parts, _ in amiss for f in parts if f not in left]
+        telling = [f for parts, _ in misread for f in parts if f not in left]
         there = [f for f in (*there, *telling) if f not in left]
         absent = [f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope))]
         estimated = any(f in telling for f in loop.used("estimator"))

@@ -90,9 +90,9 @@ class Change:
 
 
 class Costs(NamedTuple):
-    """What a late torque adds to V in a period, for each unit of its mean, of the torque that moves the rates, and of their
-    product. far: how far the latter moves the rates, for each unit. works: F for such a displacement; the mean torque then
-    does work of at most `more` |Fx|, for each unit."""
+    """The costs of a late torque: its additions to V in a period, for each unit of its mean, of the torque that moves the
+    rates, and of their product. far: how far the latter moves the rates, for each unit. works: F for such a displacement;
+    the mean torque then does work of at most `more` |Fx|, for each unit."""
 
     mean: Fraction
     moved: Fraction

@@ -93,12 +93,7 @@ class AttitudeLoop(Loop):
     driven = RATES
 
     def __init__(
-        self,
-        claim: Claim,
-        any_inertia: bool = False,
-        near: bool = False,
-        quotients: bool = False,
-        remembers: bool = False,
+        self, claim: Claim, any_inertia: bool = False, near: bool = False, quotients: bool = False, remembers: bool = False
     ) -> None:
         super().__init__(claim, Asking(nested=False) if quotients else Exactly())
         self.any_inertia, self.near = any_inertia or near, near

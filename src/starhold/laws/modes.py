@@ -224,7 +224,7 @@ class Modes:
         due: list[tuple[Truth, int]] = []
         stations = iter(watch.stations if watch else ())
         for place, (_, _, switches) in enumerate(self.parts(gains)):
-            here = _is(memory.mode, place)
+            here = is_mode(memory.mode, place)
             for slot, (switch, (after, dwell, *levels)) in enumerate(switches):
                 holds = now.later(age, after)
                 numbers = dict(zip(switch.keys, levels, strict=True))
@@ -242,7 +242,7 @@ class Modes:
             following = where(lost, float(self.on_loss), following)
         switched = less(0.5, absolute(following - memory.mode))
         memories = tuple(
-            _renewed(both(switched, _is(following, place)), kept, fresh)
+            _renewed(both(switched, is_mode(following, place)), kept, fresh)
             for place, (kept, fresh) in enumerate(zip(memory.memories, memory.fresh, strict=True))
         )
         instants = tuple(where(switched, 0.0, n) for n in instants)
@@ -256,7 +256,7 @@ class Modes:
         for place, (monitor, guard) in enumerate(zip(self.monitors, losses.guards, strict=True), 1):
             truth, guard = watched(monitor, guard, now, next(numbers), next(numbers))
             if monitor.modes:
-                looks = reduce(either, (_is(mode, one) for one in monitor.modes))
+                looks = reduce(either, (is_mode(mode, one) for one in monitor.modes))
                 truth, guard = both(looks, truth), chosen(looks, guard, monitor.at_start)
             # The first tripped monitor is recorded.
             tripped = where(both(truth, less(tripped, 0.5)), float(place), tripped)
@@ -275,7 +275,7 @@ class Modes:
             def act(_: Any, kept: Any, law: Law = mode.law, its: Any = its) -> Any:
                 return law.command(measurement, its, craft, kept)
 
-            command, kept = when(_is(memory.mode, place), act, command, memory.memories[place])
+            command, kept = when(is_mode(memory.mode, place), act, command, memory.memories[place])
             memories.append(kept)
         return command, memory._replace(memories=tuple(memories))
 
@@ -288,7 +288,7 @@ class Modes:
         resting: Truth | None = None
         for place, mode in enumerate(self.modes):
             if not mode.has(effector):
-                here = _is(memory.mode, place)
+                here = is_mode(memory.mode, place)
                 resting = here if resting is None else either(resting, here)
         return resting
 
@@ -320,7 +320,8 @@ def mode_laws(law: Law, gains: Any) -> list[tuple[str, Law, Any]]:
     return [(mode.name, mode.law, its) for mode, its, _ in law.module.parts(gains)]
 
 
-def _is(mode: Scalar, place: int) -> Truth:
+def is_mode(mode: Scalar, place: int) -> Truth:
+    """Return whether the mode of a memory is the one in this place."""
     return less(absolute(mode - float(place)), 0.5)
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from starhold.algebra.quaternion import NO_TURN
-from starhold.algebra.scalar import Truth, absolute, both, less
+from starhold.algebra.scalar import both, less
 from starhold.algebra.structure import chosen
 from starhold.algebra.structured import when
 from starhold.algebra.vector import ZERO
-from starhold.laws.modes import mode_laws
+from starhold.laws.modes import is_mode, mode_laws
 from starhold.loop.closed_loop import ClosedLoop, can_be_inactive
 from starhold.loop.slews import RESTING, Followed, Slew, Slewing, reached, slewing
 from starhold.parts.contract import Card
@@ -89,7 +89,7 @@ class ModeTargets:
                 def begin(before: Followed, module: Any = module, numbers: Any = numbers) -> tuple[Followed]:
                     return (module.begun(numbers, state, attitude, step, craft, before),)
 
-                (before,) = when(both(first, _is(memory.mode, place)), begin, before)
+                (before,) = when(both(first, is_mode(memory.mode, place)), begin, before)
         return before
 
     def goal(self, params: tuple[Any, ...], state: Any, step: Any, before: Any, mode: Any) -> Goal:
@@ -101,12 +101,8 @@ class ModeTargets:
         ]
         present = goals[0]
         for place, goal in enumerate(goals[1:], 1):
-            present = chosen(_is(mode, place), goal, present)
+            present = chosen(is_mode(mode, place), goal, present)
         return present
-
-
-def _is(mode: Any, place: int) -> Truth:
-    return less(absolute(mode - float(place)), 0.5)
 
 
 def join_targets(targets: Sequence[Fitted], slews: Sequence[Slew | None]) -> Fitted:

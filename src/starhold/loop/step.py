@@ -114,8 +114,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         )
         # Effectors that take the command measure their speeds; others have no sensor.
         turning = zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
-        measured = ((e.hook("measured_momentum") or e.module.momentum, *own) for e, *own in turning if e.flag("ACTS"))
-        momentum = total(momentum_of(inner, params) for momentum_of, inner, params in measured)
+        momentum = total(_measured(e)(inner, params) for e, inner, params in turning if e.flag("ACTS"))
 
         def show(goal, before=memories.followed):
             if goal is not None and follows:
@@ -312,6 +311,10 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         return slope((carry.state, carry.effectors, carry.actuators), begun, carry, craft, setup)
 
     return Step(measure, sense, update, propagate, check, sample, slope_of)
+
+
+def _measured(effector: Part) -> Callable[..., Any]:
+    return effector.hook("measured_momentum") or effector.module.momentum
 
 
 class _Begun(NamedTuple):

@@ -125,9 +125,7 @@ def _proved(
         # A requirement without an end covers the flight, or the time after it where it begins there.
         until = times.end if math.isfinite(times.end) else max(scenario.table.simulation.duration, times.begin)
         grown = _grown(one, claim, until)
-        # An effector unloads the wheels by an external torque, and does not take the command.
-        effectors = [fitted.part for fitted in one.loop.used("effector") if grown]
-        unloaded = any(x.flag("OUTSIDE") and not x.flag("ACTS") and "wheels" in x.needs for x in effectors)
+        unloaded = bool(grown) and any(_unloads(fitted.part) for fitted in one.loop.used("effector"))
         limited = claim.limited_to(until)
         why = why or ("" if unloaded else grown) or (f"the claim holds only if {limited}" if limited else "")
         if why:
@@ -149,8 +147,8 @@ def _proved(
         verdict = compared(table, required, most, evidence, left_out=tuple(absent))
         if verdict.verdict != "met":
             # A bound beyond the limit does not decide about the number itself.
-            why = f"only this bound is {verdict.evidence}"
-            verdict = undecided(table, why, number=verdict.number, **limits(table, required))
+            said = f"only this bound is {verdict.evidence}"
+            verdict = undecided(table, said, number=verdict.number, **limits(table, required))
         verdicts.append(verdict)
     return min(verdicts, key=lambda one: (one.verdict != "met", len(one.left_out)), default=None) or undecided(
         table, why, **limits(table, required)
@@ -243,3 +241,8 @@ def by_budget(scenario: Scenario, budget: Budget | str) -> Verdicts:
         key: compared(table, one, budget.level(TOGETHER, one.metric.upper()), f"budget: {share}", left_out=faults)
         for (key, table), one in pairs
     }
+
+
+def _unloads(part: Any) -> bool:
+    """Return whether an effector unloads the wheels by an external torque and does not take the command."""
+    return part.flag("OUTSIDE") and not part.flag("ACTS") and "wheels" in part.needs

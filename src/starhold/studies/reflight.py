@@ -136,8 +136,8 @@ def reflight(scenario: Scenario, laws: Collection[str] | None = None) -> Refligh
         elif loop.nominal is not None:
             grounded[entry.name] = SUPPOSED
         else:
-            own = {f"law.{entry.name}.{item.name}" for item in entry.law.fields()}
-            gain_keys = [key for key in gains if key in own]
+            names = {f"law.{entry.name}.{item.name}" for item in entry.law.fields()}
+            gain_keys = [key for key in gains if key in names]
             reflown.append(
                 _reflown(explicit, entry, loop, {key: dials[key] for key in (*shared, *gain_keys)}, tried, checks.fixed)
             )

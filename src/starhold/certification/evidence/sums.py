@@ -196,12 +196,12 @@ class Guess:
             step = unit(margin) / 2**digits
             y = [round(Fraction(float(v)) / step) * step for v in x[:-1]]
             covered = self.covered(len(single))
-            rest = self.amiss(y)
+            rest = self.residual(y)
             alone = {m: c for m, c in rest.items() if m not in covered}
             fixed = self.projected(y, alone, covered) if alone else y
             if fixed is None:
                 return None
-            for m, c in self.amiss(fixed).items():
+            for m, c in self.residual(fixed).items():
                 whole = sum((next(iter(grams[k - len(single)].terms.values())) for k in covered[m]), Fraction(0))
                 for k in covered[m]:
                     fixed[k] += c / whole
@@ -213,7 +213,7 @@ class Guess:
             return evidence
         return None
 
-    def amiss(self, y: list[Fraction]) -> Terms:
+    def residual(self, y: list[Fraction]) -> Terms:
         """Return the residual of p."""
         single, grams = self.columns
         rest = dict(self.p.terms)

@@ -10,20 +10,7 @@ from math import ceil
 from ..held import Held
 from ..loops import AXES, AttitudeLoop, slopes
 from ..near import Near, spinning
-from ..numbers import (
-    Account,
-    Rows,
-    beside,
-    demand,
-    matrix,
-    plus,
-    rational,
-    read_list,
-    scalar,
-    shortened,
-    times,
-    up,
-)
+from ..numbers import Account, Rows, beside, demand, matrix, plus, rational, read_list, scalar, shortened, times, up
 from ..polynomials import var
 from ..programs import Exactly, known, single
 from ..reading import Claim

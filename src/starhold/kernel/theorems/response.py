@@ -11,21 +11,7 @@ from operator import mul
 from typing import Any
 
 from ..held import Held
-from ..numbers import (
-    Account,
-    Rows,
-    beside,
-    demand,
-    norm,
-    plus,
-    rational,
-    reach,
-    read_list,
-    scalar,
-    transpose,
-    up,
-    whole,
-)
+from ..numbers import Account, Rows, beside, demand, norm, plus, rational, reach, read_list, scalar, transpose, up, whole
 from ..regions import ANGLE, RATE, SPEED, STATE, TURN, Radii, Tube, stretch
 from ..rules import Definite, Part
 

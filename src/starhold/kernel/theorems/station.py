@@ -60,7 +60,7 @@ def ends_on_circle(claim: Claim) -> Proof:
     c, heavy = circle.square, circle.weights[0]
     level, inner, outer, velocity = (numbers[name] for name in ("level", "inner", "outer", "velocity"))
     yield "centre outside", Exceeds(heavy * c * c, level)
-    yield from falls(loop, circle)
+    yield from decreases(loop, circle)
     yield from clear_of_bodies(loop, circle, level)
     demand(inner <= outer, "the radii are in another order")
     yield "inner circles", Exceeds(level, heavy * (inner * inner - c) ** 2)
@@ -96,7 +96,7 @@ def weighed(loop: PointLoop) -> Part[Circle]:
     return circle
 
 
-def falls(loop: PointLoop, circle: Circle) -> Shown:
+def decreases(loop: PointLoop, circle: Circle) -> Shown:
     """V' <= -c (f2^2 + f3^2) in the case of the law that holds on the circle, V' <= -c in all others, in which the law is
     bounded; f2 = f3 = 0 for all time only on the circle, and x returns."""
     wrong = circle.errors[1:]
