@@ -79,6 +79,20 @@ def test_how_far_a_torque_is_late_as_a_mode_begins_is_assumed(missioned):
     assert first.assumed == ("detumble ends", "point begins with a torque within 0.002 N m of its command")
 
 
+def test_where_readings_are_off_as_the_body_moves_what_a_switch_tests_is_assumed(missioned):
+    """It is told late, of the mode before, and a mode may not end that is settled to just its test."""
+    loop, found, _ = missioned
+    late = {
+        name: tuple(replace(one, numbers=one.numbers | {"told_growth": [0.1] * 6}) for one in found[name].claims)
+        for name in ("mission: point", "mission: hold")
+    }
+    first, second = links_of(loop, "mission", found | {name: replace(found[name], claims=one) for name, one in late.items()})
+    told = "begins with no larger errors of what it is told than if the body had moved so before"
+    assert first.assumed == ("detumble ends", "point begins at up to 0.5°/s and 20°", f"point {told}")
+    # What is proved of pointing is of its true end.
+    assert second.assumed == ("point ends", f"hold {told}")
+
+
 def test_what_nothing_bounds_is_assumed_or_lacks(missioned):
     loop, found, _ = missioned
     first, second = links_of(loop, "mission", {name: one for name, one in found.items() if name != "mission: point"})

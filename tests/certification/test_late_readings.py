@@ -1,5 +1,6 @@
 """Claims about loops whose sensors are late, or off in proportion to the motion, used directly and through a filter."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -171,6 +172,12 @@ def test_a_smaller_set_counts_once_what_the_body_did_before_is_forgotten(monkeyp
     assert pointing.waited(motion, large, small) >= 1
     with pytest.raises(RefusedError, match="not forgotten"):
         held(error_attitude_per_rate=0.5, error_kept=1.0)
+    # The bounds of parts are of a body that turns by less than 2 rad in a period, with its target.
+    for rate, turns in ((7.5, False), (8.5, True)):
+        motion = held(error_attitude_per_rate=2.0**-40)
+        motion.others |= dict.fromkeys(("r1", "r2", "r3"), Fraction(rate))
+        with pytest.raises(RefusedError, match="turns too far") if turns else nullcontext():
+            motion.tube(motion.region(motion.s / 2**20))
     motion = held(error_rate_per_acceleration=1e3)
     with pytest.raises(RefusedError, match="too long for the rates"):
         motion.tube(motion.region(motion.s / 2**20))

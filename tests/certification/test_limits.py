@@ -18,6 +18,7 @@ from starhold.certification.unmodelled import Pushes
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account
 from starhold.kernel.theorems.limits import within_limits
+from starhold.kernel.theorems.pointing import points
 from starhold.laws import wheel
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 from starhold.parts.effectors.wheels import State
@@ -66,19 +67,41 @@ def test_a_claim_within_other_limits_is_not_about_the_loop():
     assert apart(limited, told | {"limit": "1/1000"}) == ["the limit is one of another kind"]
 
 
-def test_a_motor_has_room_for_what_the_law_is_told_wrongly():
+def test_a_motor_has_room_for_what_the_law_is_told_wrongly_and_a_wheel_for_what_is_uneven_between_samples():
     Account.left = 10**12
     found = Loop(make_subject(rotors("wheel", GAINS)))
     own = Pushed(found, Pushes(1e-5))
     claim = own.claim(own.leans[0][1], own.numbers | found.limits | {"level": 1e-4})
     loop = AttitudeLoop(read(claim, found.by_digest))
-    exact, misread = (dict(within_limits(loop, Fraction(x))) for x in ("0", "1/100"))
-    assert any(name.startswith("motor") for name in exact)
+    ways = ({}, {"less": Fraction(1, 100)}, {"between": Fraction(1, 50)})
+    exact, misread, uneven = (dict(within_limits(loop, **way)) for way in ways)
     rows = np.linalg.pinv(np.array(pyramid()).T / np.linalg.norm(pyramid(), axis=1))
+    assert {name.split()[0] for name in exact} == {"motor", "wheel"}
     for name, o in exact.items():
-        less = float((o.p - misread[name].p).number)
-        wanted = 0.01 * np.linalg.norm(rows[int(name.split()[1].strip("+-")) - 1]) if name.startswith("motor") else 0.0
-        assert wanted <= less <= wanted * (1.0 + 1e-9), name
+        size, motor = np.linalg.norm(rows[int(name.split()[1].strip("+-")) - 1]), name.startswith("motor")
+        for less, wanted in ((misread, 0.01 * size * motor), (uneven, 0.02 * size * (not motor))):
+            assert wanted <= float((o.p - less[name].p).number) <= wanted * (1.0 + 1e-9), name
+
+
+@pytest.mark.slow
+def test_friction_and_a_lag_leave_less_room_in_a_wheel_between_samples():
+    Account.left = 10**12
+    found = Loop(make_subject(rotors("wheel", GAINS)))
+
+    def room(friction, late):
+        """What the claim leaves of a wheel's room at samples, in N m s."""
+        own = Pushed(found, Pushes(1e-5))
+        more = {"error": friction, "late.torque.mean": 0.5, "late.torque.kept": 0.1, "late.torque.weight": 1.0}
+        more |= {"late.torque.begun": 0.0, "late.torque.rest": late}
+        numbers = own.numbers | found.limits | {"level": 1e-6, "highest": 1.0, "end.angle": 1.0, "end.rate": 1.0}
+        claim = own.claim(own.leans[0][1], numbers | {k: x for k, x in more.items() if late or k == "error"})
+        steps = points(read(claim | {"theorem": "points"}, found.by_digest))
+        return next(float(o.p.at(dict.fromkeys(o.p.names, 0)).number) for name, o in steps if name == "wheel +1")
+
+    h, (row, *_) = found.loop.period, np.linalg.pinv(np.array(pyramid()).T / np.linalg.norm(pyramid(), axis=1))
+    even = room(0.0, 0.0)
+    for friction, late in ((1e-3, 0.0), (1e-3, 2e-3)):
+        assert even - room(friction, late) > 0.999 * h / 2.0 * (friction + late) * np.linalg.norm(row)
 
 
 @pytest.mark.slow

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import relative
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, apply, norm, subtract
 from starhold.analysis.meter import ALMOST, on_limit
-from starhold.analysis.rigid_body import error_angle
+from starhold.analysis.told_errors import misreadings
 from starhold.certification.appendages import recorded_states, start_of
 from starhold.certification.assumptions import LINEAR, assumption
 from starhold.certification.certificate import Certificate, Claim
@@ -31,6 +30,8 @@ Array: TypeAlias = NDArray[np.float64]
 CHANGES = "the loop, or the law's model of it, changes"
 HELD = {"held-torque", "held-field"}
 """Assumptions of claims about a torque that is held between samples."""
+RESTARTS = 64
+"""From how many instants at most a flight is looked at for whether a claim covers it."""
 LOST = "the motion diverges"
 """The reason when the motion is too fast for the integration, or beyond the divergence bound, which no proof covers."""
 TURNED = "the torque is held while the body, or stored momentum, turns it by {:.2g} rad"
@@ -210,23 +211,9 @@ def _unplanned(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[De
 
 
 def _misled(claim: Claim, span: Span) -> list[Departure]:
-    """Return the departures at which the estimation error exceeds the bound claimed for a share of flights, as it does
-    before the estimator settles."""
+    """Return the departures at which the law is told more wrongly than is claimed."""
     how = "the estimation error exceeds the stated bound"
-    return [one for far in _misreadings(claim, span) for one in span.first(far, how)]
-
-
-def _misreadings(claim: Claim, span: Span) -> list[Array]:
-    """Return for each estimate a mask of samples at which its error exceeds the bound claimed for a share of flights."""
-    if not claim.numbers.get("share"):
-        return []
-    misread = list[Array]()
-    for name in (fitted.called.replace("-", "_") for fitted in span.loop.used("estimator")):
-        turned: Any = relative(tuple(span["attitude"].T), tuple(span[f"{name}_attitude"].T))
-        off = np.linalg.norm(span[f"{name}_rate"] - span["rate"], axis=1)
-        far = error_angle(np.transpose(turned)) > claim.numbers["attitude_error"]
-        misread.append(far | (off > claim.numbers["rate_error"]))
-    return misread
+    return [one for far in misreadings(claim, span.loop, span) for one in span.first(far, how)]
 
 
 def covered(
@@ -236,18 +223,24 @@ def covered(
     settled and the motion is in the set. None if it is not proved, or never covers the run. loop, first, last: as in
     `departures`."""
     claim, span = certificate.claim("pointing"), Span(loop, run, first, last)
-    if claim is None or claim.outcome != "proved" or not len(span["time"]):
+    if claim is None or claim.outcome != "proved":
         return None
-    inside = height_of(claim, loop, span.shown) <= claim.numbers["start"]
-    wrong = [np.flatnonzero(far) for far in _misreadings(claim, span)]
-    settled = max((int(far[-1]) + 1 for far in wrong if len(far)), default=0)
-    begins = np.flatnonzero(inside[settled:])
-    if not len(begins):
-        return None
-    begin = float(span["time"][settled + begins[0]])
-    left = departures(certificate, loop, run, round(begin / loop.period), last).get("pointing", ())
-    end = min((one.time for one in left), default=float(run["time"][-1]))
-    return (begin, end) if end > begin else None
+    # From each begin on what the body did before counts no more as its motion, but as an error of what is told.
+    for _ in range(RESTARTS):
+        if not len(span["time"]):
+            return None
+        wrong = [np.flatnonzero(far) for far in misreadings(claim, loop, span)]
+        settled = max((int(far[-1]) + 1 for far in wrong if len(far)), default=0)
+        begins = settled + np.flatnonzero(height_of(claim, loop, span.shown)[settled:] <= claim.numbers["start"])
+        if not len(begins):
+            return None
+        begin = float(span["time"][begins[0]])
+        if not begins[0]:
+            left = departures(certificate, loop, run, round(begin / loop.period), last).get("pointing", ())
+            end = min((one.time for one in left), default=float(run["time"][-1]))
+            return (begin, end) if end > begin else None
+        span = Span(loop, run, round(begin / loop.period), last)
+    return None
 
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:

@@ -260,7 +260,7 @@ class Held(Follower):
         turned = self.h / 2 * far[SPEED]
         far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | asks
         demand(not self.even or region.least > turned, "motions pass a half turn")
-        demand(not self.grows or turned < 1, "the body turns too far in a period")
+        demand(not self.grows or turned + self.h / 2 * self.size("r") < 1, "the body turns too far in a period")
         pushed, stale = self.pushed(far)["both"], self.stale(far, self.beside)
         bent = [[most(p.slope(name), far) for name in STATE[RATE]] for p in self.bend]
         end = beyond(wide, sizes)

@@ -29,7 +29,7 @@ ASSUMPTIONS = {
     "late-told": "errors of what the law is told are no larger at the start than if the body had moved so before",
     "best-plan": "the law's torque is of a plan as told, for the given inertia and motion linearised about the rate told",
     "gaussian-noise": "noise is Gaussian, and independent from sample to sample",
-    "linear-estimate": "noise drives errors of what the law is told linearly, as for the target's rate at the start",
+    "linear-estimate": "noise and errors of readings put an estimate off linearly, as for the target's rate at the start",
     "settled-estimate": "an estimate has settled before",
     "valid-estimate": "an estimate is valid throughout",
     "held-field": "the field at a craft is held for a control period, and is as told",

@@ -49,13 +49,17 @@ class Link(NamedTuple):
         if self.claim is None or self.lacks:
             return f"not taken over: {listed(self.lacks)}"
         given = f", assuming that {listed(self.assumed)}" if self.assumed else ""
-        n, bounds = self.claim.numbers, list[str]()
-        bounds += [f"{np.degrees(self.rate):.3g}°/s"] if self.rate < inf else []
-        bounds += [f"{np.degrees(self.angle):.3g}°"] if self.angle < inf else []
-        bounds += [f"{1e3 * self.momentum:.3g} mN m s of momentum"] if self.wide else []
-        begun = f" at up to {listed(bounds)}" if bounds else ""
+        n, stored = self.claim.numbers, [f"{1e3 * self.momentum:.3g} mN m s of momentum"] * self.wide
+        bounds = bounded(self.rate, self.angle, *stored)
+        begun = f" {bounds}" if bounds else ""
         end = f"within {np.degrees(n['angle']):.3g}° of the target after {n['settling']:.4g} s"
         return f"taken over{begun}: {end}{given}"
+
+
+def bounded(rate: float, angle: float, *more: str) -> str:
+    """Return words about a state at up to a rate (rad/s), an angle (rad) and more, without those that are inf."""
+    bounds = [f"{np.degrees(rate):.3g}°/s"] * (rate < inf) + [f"{np.degrees(angle):.3g}°"] * (angle < inf)
+    return f"at up to {listed((*bounds, *more))}" if bounds or more else ""
 
 
 def links_of(loop: ClosedLoop, name: str, certificates: Mapping[str, Certificate]) -> list[Link]:
@@ -180,6 +184,11 @@ def _link(one: HandOver, before: str, after: str, last: Claim | None, claim: Cla
     if claim is not None and (late := claim.numbers.get("late_torque")):
         # The next law may ask for another torque at once.
         assumed.append(f"{after} begins with a torque within {late:.4g} N m of its command")
+    if claim is not None and "told_growth" in claim.numbers:
+        # What the tests look at is then off as the body moves in the mode before.
+        sure = flown_ends({}, one.before, one.after, None if early else last, claim)
+        assumed += [f"{after} begins {bounds}" for bounds in [bounded(rate, angle)] if (rate, angle) != sure]
+        assumed.append(f"{after} begins with no larger errors of what it is told than if the body had moved so before")
     assumed += [limited] if claim is not None and (limited := claim.limited_to(inf)) else []
     lacks = _lacking(before, after, claim, 0.0 if early else rate, angle)
     heavy = [] if claim is None else _heavy(after, claim, momentum)
@@ -194,11 +203,12 @@ def _is_early(one: HandOver, begun: float) -> bool:
 
 def _unending(one: HandOver, before: str, last: Claim) -> list[str]:
     """Return the assumptions needed for a settled mode to end; none where it is no worse if the mode does not end."""
-    n = last.numbers
-    rate = n["rate"] + n["rate_error"]
-    settled = {"angle_below": n["angle"] + n["attitude_error"], STORED: -inf}
-    settled["rate_below"] = rate + misjudged(one.before, last)
-    settled["body_rate_below"] = rate + above(make_subject(one.before).target_rate)
+    n, settled = last.numbers, {STORED: -inf}
+    if "told_growth" not in n:
+        # Else how far off what it looks at is then depends on how the body moves.
+        rate = n["rate"] + n["rate_error"]
+        settled |= {"angle_below": n["angle"] + n["attitude_error"], "rate_below": rate + misjudged(one.before, last)}
+        settled["body_rate_below"] = rate + above(make_subject(one.before).target_rate)
     unmet = [test for test, level in one.levels.items() if not settled.get(test, inf) < level]
     if unmet == [RELEASED]:
         return [f"{before} brings the wheels' momentum below {1e3 * one.levels[RELEASED]:.3g} mN m s"]

@@ -18,11 +18,17 @@ Most: TypeAlias = list[Fraction | None]
 TORQUE, UNIT = "torque-limit", variables("d")
 
 
-def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0), largest: Sequence[Fraction] | None = None) -> Proof:
+def within_limits(
+    loop: AttitudeLoop,
+    less: Fraction = Fraction(0),
+    largest: Sequence[Fraction] | None = None,
+    between: Fraction = Fraction(0),
+) -> Proof:
     """On {V <= level}, or everywhere, with external inputs within their bounds: each component of the torque is at most
     `limit` in size (`limit.norm`: their norm); each listed motor gives at most motors.k, each listed wheel stores at most
     stored.k. less: a bound of the torque error due to wrong inputs of the law. largest: a bound of the torque about each
-    axis, errors included, if known."""
+    axis, errors included, if known. between: a bound of the momentum that wheels store between samples beyond what they
+    store at both."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
     limit, longest = numbers.get("limit"), numbers.get("limit.norm")
     count = next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
@@ -68,8 +74,8 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0), largest: Seq
         stores = [keeps - p for keeps, p in zip(kept, apply(shares, loop.stored), strict=True)]
         for k, row in enumerate(shares):
             given = motors[k]
-            driven = None if given is None else given - norm(row) * less
-            for name, most, load, rest in (("motor", driven, row, none), ("wheel", stored[k], NONE, stores[k])):
+            driven, kept_at = (None if x is None else x - norm(row) * y for x, y in ((given, less), (stored[k], between)))
+            for name, most, load, rest in (("motor", driven, row, none), ("wheel", kept_at, NONE, stores[k])):
                 if most is None:
                     continue
                 for sign in (1, -1):

@@ -85,7 +85,10 @@ def points(claim: Claim) -> Proof:
         off += behind_at_most
     if WITHIN in numbers:
         yield "torque that follows", Exceeds(numbers[WITHIN], behind_at_most)
-    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques)
+    # Wheels take up what is asked for evenly, but for friction and for what is late, each no more than its bound.
+    pushed = motion.pushed(tube.sizes)
+    between = h / 2 * (pushed["both"] - pushed["outside"] - motion.planned(tube.sizes) + behind_at_most)
+    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques, between)
     if loop.signs:
         yield "the sign never changes", Exceeds(region.least, motion.misled(region.sizes)[0] / 2)
     if motion.late and (change := motion.change_in(tube)):
