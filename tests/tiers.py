@@ -1,4 +1,4 @@
-"""How much of long products a run of the tests goes through: a part in `make test`, the whole in `make test-all`."""
+"""How much of long products a run of the tests goes through: a part in `make test`, more or the whole in `make test-all`."""
 
 import os
 import random
