@@ -143,7 +143,8 @@ def claims_table() -> str:
         found: dict[str, list[str]] = {"every claim": [], "pointing": [], "none": []}
         for name, part in parts(role).items():
             tells = any(
-                part.hook(hook) is not None for hook in ("bound", "error", "late", "noise", "perturbation", "recursion")
+                part.hook(hook) is not None
+                for hook in ("bound", "direction", "error", "late", "noise", "perturbation", "place", "recursion")
             )
             moves = role == "target" and part.hook("motion") is not None
             by = "every claim" if moves or name in READ.get(role, ()) else "pointing" if tells else "none"

@@ -23,7 +23,7 @@ from starhold.certification.evidence.finding import certificate as found
 from starhold.certification.measured import _rate as goal_rate
 from starhold.certification.proofs import checked
 from starhold.certification.subject import described, make_subject
-from starhold.certification.unmodelled import change_of_modelled, driven_errors, envelope_of, named, noisy_fields, pushes
+from starhold.certification.unmodelled import change_of_modelled, driven_errors, envelope_of, gaussian_vectors, named, pushes
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
 from starhold.kernel.check import check
@@ -240,7 +240,7 @@ def test_the_noise_of_each_magnetometer_is_counted():
     """A claim that counts one vector a sample is not about a loop with two."""
     loop = nadir()
     one, two = (Loop(make_subject(each)) for each in (loop, loop.with_parts(*loop.parts, loop.find("magnetometer"))))
-    assert (noisy_fields(one.loop), noisy_fields(two.loop)) == (1, 2)
+    assert (gaussian_vectors(one.loop), gaussian_vectors(two.loop)) == (1, 2)
     claim = noise_claim(loop)
     assert "noise.beside" in claim["numbers"]
     differs = "the noise.beside.vectors differs"

@@ -11,7 +11,7 @@ from starhold.algebra.vector import ZERO
 from starhold.parts import magnetic_field, sun
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import PACKAGES, parts
-from starhold.parts.contract import Envelope, Errors
+from starhold.parts.contract import DEVIATIONS, Envelope, Errors
 from starhold.parts.effectors import magnetic_unloading, wheels
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 from starhold.parts.environments import constant_torque, drag, random_torque, residual_dipole, solar_pressure, torque_table
@@ -245,6 +245,7 @@ def of_gyro(random):
             mounting_error=vector(random, float(random.choice([0.0, random.uniform(0.0, 0.5)]))),
             axis_errors=tuple(map(tuple, (float(random.choice([0.0, 0.3])) * random.normal(size=(3, 3))).tolist())),
             delay=float(random.choice([0.0, size(random, 1e-3, 10.0)])),
+            jitter=float(random.choice([0.0, size(random, 1e-4, 1.0)])),
         )
     bound, q = gyro.error(given), along(np.append(1.0, np.array(given.mounting_error) / 2))
     skew = (np.eye(3) + np.array(given.axis_errors)) @ turned(np.tile(q, (3, 1)), np.eye(3)).T
@@ -252,7 +253,8 @@ def of_gyro(random):
     def share(x):
         # The rate changes evenly for as long as a reading takes.
         rate, change = 0.01 * x[:, :3], np.exp(2.0 * x[:, 6:7] - 4.0) * along(x[:, 3:6])
-        before = rate - given.delay * change
+        late = given.delay + DEVIATIONS * given.jitter * np.tanh(x[:, 7:8])
+        before = rate - late * change
         shown = (1.0 + given.scale_error) * before @ skew.T + np.array(given.bias)
         shown = given.resolution * np.round(shown / given.resolution) if given.resolution else shown
         fast = np.maximum(*(np.linalg.norm(one, axis=1) for one in (rate, before)))
@@ -264,7 +266,10 @@ def of_gyro(random):
 
 def of_tracker(random):
     period, delay = size(random, 0.01, 10.0), float(random.choice([0.0, random.uniform(0.0, 3.0)]))
-    given = star_tracker.Params(0.0, 0.0, mounting_error=vector(random, random.uniform(0.0, 0.5)), delay=delay * period)
+    jitter = float(random.choice([0.0, random.uniform(0.0, 0.3)]))
+    given = star_tracker.Params(
+        0.0, 0.0, mounting_error=vector(random, random.uniform(0.0, 0.5)), delay=delay * period, jitter=jitter * period
+    )
     bound, whole = star_tracker.error(given), np.floor(delay)
     mounted = along(np.append(1.0, np.array(given.mounting_error) / 2))
 
@@ -276,7 +281,8 @@ def of_tracker(random):
             half = -0.5 * steps * period * np.linalg.norm(rate, axis=1)[:, None]
             return np.concatenate([np.cos(half), np.sin(half) * along(rate)], axis=1)
 
-        seen = along(before(whole) + (delay - whole) * (before(whole + 1.0) - before(whole)))
+        share = delay - whole + DEVIATIONS * jitter * np.tanh(x[:, 4:5])
+        seen = along(before(whole) + share * (before(whole + 1.0) - before(whole)))
         q0 = seen[:, 0] * mounted[0] - seen[:, 1:] @ mounted[1:]
         most = bound.attitude + bound.turning * np.linalg.norm(rate, axis=1)
         return 2.0 * np.arccos(np.minimum(np.abs(q0), 1.0)) / most

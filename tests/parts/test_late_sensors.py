@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import starhold as sh
 from starhold.errors import InputError
 from starhold.parts.catalogue import parts
-from starhold.parts.contract import UNBOUNDED
+from starhold.parts.contract import DEVIATIONS, UNBOUNDED
 from starhold.parts.random import Dice, Silent
 from starhold.parts.sensors import gnss, gyro
 from tests.parts.trackers import ARCSEC, FILTER, FIRST, GYRO, errors, scenario
@@ -142,12 +142,13 @@ LATE = [p for p in parts("sensor").values() if {"delay", "jitter"} & {*p.module.
 @pytest.mark.parametrize("key", ["delay", "jitter"])
 def test_a_claim_bounds_no_sensor_that_is_late_anyhow(part, key):
     """What declares the error of readings calls it unbounded, whatever else the sensor has, but that by a delay of attitude
-    or rate, which grows with the motion; a claim leaves out one that declares none, with its noise."""
+    or rate or by its jitter, which grows with the motion; a claim leaves out one that declares none, with its noise."""
     tell = part.hook("error")
     for params in part.module.examples():
         late = params._replace(**{"jitter": 0.0, key: 0.1}) if hasattr(params, "jitter") else params._replace(**{key: 0.1})
         errors = UNBOUNDED if tell is None else tell(late)
-        grows = key == "delay" and max(errors.turning, errors.late) >= errors.ago == 0.1
+        expected = 0.1 if key == "delay" else late.delay + 0.1 * DEVIATIONS
+        grows = max(errors.turning, errors.late) >= errors.ago == expected and errors.gaussian == (key == "jitter")
         assert errors == UNBOUNDED or (grows and part.name in ("gyro", "star-tracker"))
     assert tell is not None or part.hook("noise") is None
     assert {"gyro", "magnetometer", "star-tracker"} <= {p.name for p in LATE}

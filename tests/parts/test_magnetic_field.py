@@ -6,7 +6,8 @@ import ppigrf
 import pytest
 
 from starhold.parts.epoch import DAY, days_of, sidereal
-from starhold.parts.magnetic_field import RADIUS, ROWS, earth_fixed, field, prepared, strongest
+from starhold.parts.magnetic_field import RADIUS, ROWS, earth_fixed, field, prepared, steepest, strongest, weakest
+from starhold.trace.straight_line import evaluated, straight_line
 from tests.parts.fields import reference
 
 NEW_YEAR = (2025.0, 1.0, 1.0, 0.0, 0.0, 0.0)
@@ -104,3 +105,29 @@ def test_days_and_bad_epochs():
     ):
         with pytest.raises(ValueError, match=words):
             prepared(epoch)
+
+
+def test_nowhere_is_the_field_weaker_or_steeper_than_its_bounds():
+    random, epoch = np.random.default_rng(5), (2026.0, 3.0, 20.0, 12.0, 0.0, 0.0)
+    numbers, low, high = prepared(epoch), 6.85e6, 6.9e6
+    least, steep, curved = weakest(epoch, low, high), steepest(epoch, low), steepest(epoch, low, 2)
+
+    def equation(position):
+        return earth_fixed(position, numbers)
+
+    program = straight_line(equation, position=(0.0, 0.0, 0.0))
+
+    def at(where):
+        return np.array(evaluated(program, position=tuple(where)))
+
+    many = random.normal(size=(3, 5_000))
+    # Where it is weakest, over the South Atlantic, too.
+    many[:, ::2] = np.array([[0.55], [-0.72], [-0.43]]) + 0.2 * many[:, ::2]
+    many *= random.uniform(low, high, size=5_000) / np.linalg.norm(many, axis=0)
+    found = np.linalg.norm(at(many), axis=0).min()
+    assert 0.97 * found < least < found
+    way = random.normal(size=(3, 5_000))
+    way *= 100.0 / np.linalg.norm(way, axis=0)
+    ahead, here, behind = (at(many + k * way) for k in (1.0, 0.0, -1.0))
+    assert 0.25 * steep < np.linalg.norm(ahead - behind, axis=0).max() / 200.0 < steep
+    assert 0.1 * curved < np.linalg.norm(ahead - 2.0 * here + behind, axis=0).max() / 1e4 < curved

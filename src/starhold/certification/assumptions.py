@@ -10,7 +10,7 @@ import numpy as np
 
 from starhold.algebra.quaternion import conjugate, multiply, to_reference
 from starhold.algebra.vector import ZERO
-from starhold.certification.certificate import LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
+from starhold.certification.certificate import FRESH, LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
 from starhold.certification.orbit_band import strays
 from starhold.certification.target_motion import motion_of
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
@@ -54,6 +54,16 @@ def assumption(identifier: str) -> Assumption:
             return [(off[:1] > most * MORE, "the torque that acts is further from the command")]
 
         return Assumption(f"a torque that acts within {most:.4g} N m of the command at the start", late)
+    if identifier.startswith(FRESH):
+        age = float(identifier.removeprefix(FRESH))
+
+        def aged(span: Any) -> Unmet:
+            names = (f"{fitted.called.replace('-', '_')}_attitude_age" for fitted in span.loop.used("estimator"))
+            # Ages are sums of control periods.
+            return [(span[name] > age * MORE + NEAR, "directions give no attitude") for name in names]
+
+        most = f"at every control instant, or one no older than {age:.6g} s" if age else "at every control instant"
+        return Assumption(f"directions that give an attitude {most}, as far apart as the estimator asks for", aged)
     if identifier.startswith(UNTIL):
         until = float(identifier.removeprefix(UNTIL))
 

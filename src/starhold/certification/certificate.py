@@ -96,6 +96,7 @@ class Claim:
         """Return the conditions under which it is about a flight up to a time (s); empty where there are none."""
         end = min(self.numbers_of(UNTIL), default=inf)
         about = [f"the flight lasts {end:.6g} s at most"] * (end < until)
+        about += ["directions give an attitude all the time"] * bool(self.numbers_of(FRESH))
         return " and ".join(["the target does not jump"] * (STEADY in self.assumptions) + about)
 
     def angle_from(self, time: float) -> float:
@@ -107,9 +108,10 @@ class Claim:
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
-WITHOUT, ORBIT, UNTIL, LATE = "without:", "orbit-within:", "until:", "late:"
+WITHOUT, ORBIT, UNTIL, LATE, FRESH = "without:", "orbit-within:", "until:", "late:", "fresh:"
 """The prefixes of the identifiers of assumptions: that a part, role and name, is absent; that forces move the orbit by at
-most a share; that a flight has not lasted longer (s); and that the torque is at first no further from the command (N m)."""
+most a share; that a flight has not lasted longer (s); that the torque is at first no further from the command (N m); and
+that directions gave an attitude no longer ago (s)."""
 STEADY = "steady-target"
 """The assumption that the target does not jump."""
 BESIDE = ("sampling", "control-limit", "saturated-axis", "detumbling")

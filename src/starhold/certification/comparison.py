@@ -20,7 +20,14 @@ from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import above, fraction
 from starhold.certification.measured import driven_errors
 from starhold.certification.subject import make_subject
-from starhold.certification.unmodelled import GROWING, Pushes, change_of_modelled, late_torque, noisy_fields, samples_of
+from starhold.certification.unmodelled import (
+    GROWING,
+    Pushes,
+    change_of_modelled,
+    gaussian_vectors,
+    late_torque,
+    samples_of,
+)
 from starhold.kernel.follower import KNOWN, LATE
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, TOLD_TORQUE, WHEELS
@@ -102,7 +109,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
     if "share" in numbers and (driven := driven_errors(loop)) is not None:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
-        exactly[VECTORS] = noisy_fields(loop)
+        exactly[VECTORS] = gaussian_vectors(loop)
         numbers |= {} if VECTORS in numbers or BESIDE not in numbers else {VECTORS: Fraction(1)}
     if claim["theorem"] in BOUNDED:
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)

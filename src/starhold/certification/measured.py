@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import flatten, leaves
-from starhold.algebra.vector import IDENTITY, Vector, apply, scale
+from starhold.algebra.vector import IDENTITY, Vector, apply, diagonal, multiply, scale
+from starhold.certification.directions import WIDER, directed, is_directed, shown
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import NO_ERRORS, Errors, Noise, Recursion
 from starhold.parts.part import Fitted
@@ -52,12 +53,15 @@ class Told(NamedTuple):
 
 class Measured(NamedTuple):
     """The errors of an estimate, or of noisy readings that the law uses directly: besides noise, and as noise drives them;
-    the parts that they come from, and whether there is noise."""
+    the parts that they come from, and whether there is noise; by how much this is wider than the noise of the parts, and how
+    many Gaussian vectors count in the errors besides."""
 
     amiss: Told
     recursion: Recursion
     parts: tuple[Fitted, ...]
     random: bool
+    wider: float = 1.0
+    gaussian: int = 0
 
 
 class Driven(NamedTuple):
@@ -81,7 +85,8 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
         driven = Driven(_as_read(Noise()), tuple(torques))
     else:
         return None
-    return driven._replace(torque=hypot(*(noise_of(fitted, loop.period).torque for fitted in torques)))
+    wider = 1.0 if result is None else result.wider
+    return driven._replace(torque=wider * hypot(*(noise_of(fitted, loop.period).torque for fitted in torques)))
 
 
 def measured(loop: ClosedLoop) -> Measured | None:
@@ -91,7 +96,12 @@ def measured(loop: ClosedLoop) -> Measured | None:
     if loop.target.part.flag("BY_MODE"):
         return None
     estimators = loop.used("estimator")
+    by_directions = bool(estimators) and is_directed(estimators[0])
+    fix = directed(loop, estimators[0]) if by_directions else None
+    if by_directions and (fix is None or len(estimators) > 1):
+        return None
     wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
+    wanted = {"rate"} if by_directions else wanted
     sensors = tuple(f for f in loop.used("sensor") if wanted & shown(f))
     bounds = [bounded(f, loop.period, bool(estimators)) for f in sensors]
     if not sensors or None in bounds or any(f.part.hook("noise") is None for f in sensors):
@@ -101,6 +111,10 @@ def measured(loop: ClosedLoop) -> Measured | None:
         [(noise_of(f, loop.period), bound) for f, bound in zip(sensors, bounds, strict=True) if name in shown(f)]
         for name in ("attitude", "rate")
     )
+    wider, gaussian = 1.0, sum(bound.gaussian for bound in bounds if bound is not None)
+    if fix is not None:
+        attitudes, wider, gaussian = [(fix.noise, fix.errors)], WIDER, gaussian + fix.gaussian
+        sensors = (*sensors, *(f for f in fix.sensors if f not in sensors))
     every = {noise.every for noise, _ in attitudes}
     if len(rates) > 1 or len(every) > 1 or (len(attitudes) > 1 and "attitude" not in several):
         return None
@@ -110,10 +124,13 @@ def measured(loop: ClosedLoop) -> Measured | None:
         noise = noise._replace(attitude=first.attitude, every=first.every, more=others)
     for reading, _ in rates:
         noise = noise._replace(rate=reading.rate, walk=reading.walk)
-    random = is_random(noise)
+    random = is_random(noise, NO_ERRORS._replace(gaussian=gaussian))
+    if wider > 1.0:
+        wide = diagonal((wider, wider, wider))
+        noise = noise._replace(attitude=multiply(wide, noise.attitude), rate=wider * noise.rate)
     if not estimators:
         amiss = reduce(Told.__add__, (as_read(bound) for bound in bounds if bound is not None))
-        return Measured(amiss, _as_read(noise), sensors, True) if random and not noise.walk else None
+        return Measured(amiss, _as_read(noise), sensors, True, 1.0, gaussian) if random and not noise.walk else None
     tell: Any = estimators[0].part.hook("recursion")
     if tell is None:
         return None
@@ -121,8 +138,8 @@ def measured(loop: ClosedLoop) -> Measured | None:
     recursion: Recursion | None = tell(given[0], noise, *given[1:])
     if recursion is None:
         return None
-    amiss = _estimated(recursion.lag, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
-    return None if amiss is None else Measured(amiss, recursion, (*sensors, *estimators), random)
+    amiss = _estimated(recursion, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
+    return None if amiss is None else Measured(amiss, recursion, (*sensors, *estimators), random, wider, gaussian)
 
 
 def bounded(fitted: Fitted, period: float, estimated: bool = False) -> Errors | None:
@@ -147,14 +164,9 @@ def noise_of(fitted: Fitted, period: float) -> Noise:
     return Noise() if tell is None else tell(fitted.params, period)
 
 
-def is_random(noise: Noise) -> bool:
-    """Return whether a reading has an unbounded error."""
-    return any(leaves(noise._replace(every=0)))
-
-
-def shown(sensor: Fitted) -> set[str]:
-    """Return the names of a sensor's readings."""
-    return set(sensor.part.module.Reading._fields)
+def is_random(noise: Noise, errors: Errors | None = None) -> bool:
+    """Return whether a reading has an unbounded error, or one that has a bound but for a share of times."""
+    return any(leaves(noise._replace(every=0))) or (errors is not None and errors.gaussian > 0)
 
 
 def tells_place(fitted: Fitted) -> bool:
@@ -163,13 +175,16 @@ def tells_place(fitted: Fitted) -> bool:
     return not PLACED.isdisjoint((module.Reading if fitted.part.role == "sensor" else module.Estimate)._fields)
 
 
-def _estimated(lag: float, tell: Any, given: Any, noise: Noise, rates: list[Any], attitudes: list[Any]) -> Told | None:
-    """Return the errors of an estimate with errors of its readings besides noise; None where it does not forget them. It
-    removes a bias of the rate. lag: of its recursion."""
+def _estimated(
+    recursion: Recursion, tell: Any, given: Any, noise: Noise, rates: list[Any], attitudes: list[Any]
+) -> Told | None:
+    """Return the errors of an estimate with errors of its readings besides noise; None where it does not forget them."""
     units = noise._replace(attitude=IDENTITY, rate=1.0, walk=0.0, more=(IDENTITY,) * len(noise.more))
-    steady = [(gyro.rate - gyro.bias, gyro.turned, gyro.late) for gyro in rates[:1]] or [(0.0, 0.0, 0.0)]
+    steady = [(gyro.rate - (0.0 if recursion.biased else gyro.bias), gyro.turned, gyro.late) for gyro in rates[:1]] or [
+        (0.0, 0.0, 0.0)
+    ]
     steady += [(tracker.attitude, tracker.turning, 0.0) for tracker in attitudes]
-    if not lag and not any(map(any, steady)):
+    if not recursion.lag and not any(map(any, steady)):
         return Told()
     gains = _gains(tell, given, units)
     if gains is None:
@@ -181,7 +196,8 @@ def _estimated(lag: float, tell: Any, given: Any, noise: Noise, rates: list[Any]
     )
     hurried, late = (x + more for x, more in zip((hurried, late), later, strict=True))
     ago = steps * given[1] + max(one.ago for one in (*rates, *attitudes))
-    return Told(attitude, rate, turned, hurried, rated, late, ago, kept)
+    amiss = Told(attitude, rate, turned, hurried, rated, late, ago, kept)
+    return amiss if amiss.grows else amiss._replace(ago=0.0, kept=0.0)
 
 
 @cache

@@ -12,6 +12,7 @@ import numpy as np
 from starhold.algebra.vector import norm
 from starhold.certification.appendages import appendages, tells_momentum
 from starhold.certification.certificate import LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
+from starhold.certification.directions import freshness, shown
 from starhold.certification.measured import (
     Told,
     as_read,
@@ -20,7 +21,6 @@ from starhold.certification.measured import (
     is_random,
     measured,
     noise_of,
-    shown,
     tells_place,
 )
 from starhold.certification.orbit_band import band_of, extremes, movers
@@ -125,8 +125,8 @@ def _told(loop: ClosedLoop) -> list[tuple[tuple[Fitted, ...], Told]]:
     misread = [] if result is None else [(together, result.amiss)]
     for f in _acting(loop):
         # A part that is left out for its noise is left out with its other errors.
-        errors = None if f in together or is_random(noise_of(f, loop.period)) else bounded(f, loop.period)
-        misread += [] if errors is None else [((f,), as_read(errors))]
+        errors = None if f in together else bounded(f, loop.period)
+        misread += [] if errors is None or is_random(noise_of(f, loop.period), errors) else [((f,), as_read(errors))]
     return misread
 
 
@@ -227,6 +227,7 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         absent = [f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope))]
         estimated = any(f in telling for f in loop.used("estimator"))
         settled = [name for name in SETTLED if estimated and name not in claim.assumptions]
+        settled += freshness(loop) if estimated else []
         share = band_of(loop).share
         behind = [f"{LATE}{claim.numbers['late_torque']!r}"] if claim.numbers.get("late_torque") else []
         names = (f"{WITHOUT}{_called(f)}" for f in absent)
@@ -322,9 +323,11 @@ def _field_error(fitted: Fitted, period: float, noisy: bool) -> float:
     return inf if error is None or (deviation and not noisy) else error.field + DEVIATIONS * deviation
 
 
-def noisy_fields(loop: ClosedLoop) -> int:
-    """Return how many sensors measure the magnetic field with noise."""
-    return sum(bool(noise_of(fitted, loop.period).field) for fitted in loop.used("sensor"))
+def gaussian_vectors(loop: ClosedLoop) -> int:
+    """Return how many Gaussian vectors count in bounds at a reading, as of a magnetic field measured with noise."""
+    result = measured(loop)
+    fields = sum(bool(noise_of(fitted, loop.period).field) for fitted in loop.used("sensor"))
+    return fields + (0 if result is None else result.gaussian)
 
 
 def _is_idle(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS
-from starhold.certification.certificate import FILE, ORBIT, STEADY, UNTIL, Certificate, Claim, Obligation
+from starhold.certification.certificate import FILE, FRESH, ORBIT, STEADY, UNTIL, Certificate, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.rounding import angle, growing, shown, speed
 from starhold.laws.catalogue import file_of, known_law
@@ -93,6 +93,8 @@ def _unbounded(claim: Claim, subject: Mapping[str, Any]) -> str:
     kept = "".join(f"on an orbit within {100.0 * share:.3g} % of a two-body one, " for share in claim.numbers_of(ORBIT))
     kept += "between jumps of its target, " * (STEADY in claim.assumptions)
     kept += "".join(f"for the flight's first {end:.6g} s, " for end in claim.numbers_of(UNTIL))
+    for age in claim.numbers_of(FRESH):
+        kept += f"while directions give an attitude {f'each {age:.6g} s' if age else 'at each control instant'}, "
     return kept + _ideal(claim, subject)
 
 

@@ -14,7 +14,9 @@ from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit, telling
+from starhold.parts.contract import DEVIATIONS
 from starhold.parts.craft import Craft, make_craft
+from starhold.parts.random import Silent
 
 CRAFT = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)
 PERIOD = 0.1
@@ -57,6 +59,18 @@ def sample_loop(law: Law, gains: Any) -> ClosedLoop:
         limit="axis",
         sign_policy="hysteresis",
     )
+
+
+class Jumping(Silent):
+    """Random vectors that are all 0, for readings without noise, and single random numbers, as of an instant's jitter, that
+    are as far from 0 as they are assumed to be, now and then on either side."""
+
+    sign = 1.0
+
+    def normals(self, place: int, count: int) -> tuple[float, ...]:
+        """Return a number that is large, or zeros for several."""
+        self.sign = -self.sign
+        return (self.sign * DEVIATIONS,) if count == 1 else (0.0,) * count
 
 
 def call(law: Law, measurement: Measurement, gains: Any, craft: Craft = CRAFT) -> Vector:

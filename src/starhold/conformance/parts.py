@@ -15,7 +15,8 @@ from starhold.algebra.vector import ZERO, Vector, add, apply, norm, scale, subtr
 from starhold.certification.measured import bounded
 from starhold.certification.target_motion import motion_of
 from starhold.certification.unmodelled import COMMANDED, envelope_of
-from starhold.conformance.bench import PERIOD, anywhere, moving, sample_loop
+from starhold.conformance.bench import PERIOD, Jumping, anywhere, moving, sample_loop
+from starhold.conformance.directions import misdirected, tells
 from starhold.conformance.units import SYSTEMS, rescale, rescale_params
 from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, find, require, run
 from starhold.errors import InputError
@@ -27,7 +28,7 @@ from starhold.parts.contract import UNBOUNDED, Card, Errors, Push
 from starhold.parts.craft import make_craft
 from starhold.parts.orbit import at_anomaly
 from starhold.parts.part import Fitted, Part
-from starhold.parts.random import Dice, Silent
+from starhold.parts.random import Dice
 from starhold.scenario.bodies import bodies
 from starhold.scenario.bodies.any_body import tables_of
 from starhold.scenario.parts import ROLES, part_model, read_parts
@@ -218,7 +219,8 @@ def draws_in_its_range(part: Part) -> None:
 
 def keeps_what_it_says(part: Part) -> None:
     """No torque is larger than its `bound` or changes faster than its `torque_change`, no error is larger than its `error`,
-    besides its `noise`, and no motion of a target than its `motion`; an output follows the command as it says by `late`."""
+    `direction` or `combined`, besides its `noise`, and no motion of a target than its `motion`; outputs follow commands as
+    it says by `late`."""
     if part.hook("late") is not None:
         _follows_as_it_says(part)
         return
@@ -227,7 +229,7 @@ def keeps_what_it_says(part: Part) -> None:
         _moves_as_it_says(part)
         return
     tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
-    if all(tell is None for tell in (tell_torque, tell_errors, tell_change)):
+    if not (tells(part) or tell_torque or tell_errors or tell_change):
         raise NotApplicableError("it says no bound of its torque, of its errors or of its motion")
     for params in part.examples():
         loop = loop_with(part, params)
@@ -243,7 +245,7 @@ def keeps_what_it_says(part: Part) -> None:
         limits = (*errors, *torque, *command, *change)
         require(min(limits) >= 0.0, f"the bounds {limits} are not all positive or 0")
         pushed = _pushes(part, loop, errors, torque, command)
-        for name, size, bound in (*pushed, *(_changes(part, loop, change) if tell_change else ())):
+        for name, size, bound in (*pushed, *(_changes(part, loop, change) if tell_change else ()), *misdirected(part, loop)):
             require(size <= bound * (1.0 + 1e-9) + 1e-12, f"the {name} is {size:g}, larger than {bound:g}")
 
 
@@ -295,8 +297,7 @@ def _follows_as_it_says(part: Part) -> None:
 
 
 def _moves_as_it_says(part: Part) -> None:
-    """Check that a target's rate and acceleration are within its `motion`, at points of the orbit and instants of a year or
-    of the time for which it states them."""
+    """Check a target's rate and acceleration at points of the orbit and instants of a year or of the time that it states."""
     for params in part.examples():
         loop, random = loop_with(part, params), np.random.default_rng(3)
         motion = motion_of(loop)
@@ -315,15 +316,14 @@ def _moves_as_it_says(part: Part) -> None:
 
 def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:
     """Yield torques and errors of a part at states of a flight and at other attitudes, with their bounds."""
-
-    dice = Silent() if part.hook("noise") else Dice((1, 2), 3, 0)
-    fitted, module = next(f for f in loop.parts if f.part == part), part.module
-    numbers, random = fitted.prepared(loop.period), np.random.default_rng(1)
+    dice = Jumping() if part.hook("noise") else Dice((1, 2), 3, 0)
+    fitted, module, random = next(f for f in loop.parts if f.part == part), part.module, np.random.default_rng(1)
+    numbers = fitted.prepared(loop.period)
 
     def most(push: Push, state: Any) -> float:
         return push.torque + push.per_rate * norm(state.rate)
 
-    memory = fitted.remembered(numbers, *([loop.start] if part.role == "sensor" else []))
+    memory = fitted.remembered(numbers, *([loop.start] if part.role in ("sensor", "estimator") else []))
     states = (moving if errors.grow else anywhere)(loop, random)
     for step, (state, fast, hurried) in enumerate(islice(states, STEPS)):
         if part.role == "environment":

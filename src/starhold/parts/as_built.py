@@ -17,7 +17,7 @@ from starhold.algebra.scalar import Scalar
 from starhold.algebra.several import each
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import IDENTITY, Matrix, Vector, add, apply, clip_axes, diagonal, multiply, scale
-from starhold.parts.contract import NoMemory, Parameter
+from starhold.parts.contract import DEVIATIONS, NoMemory, Parameter
 from starhold.parts.random import Dice
 
 Turn: TypeAlias = Quaternion | tuple[()]
@@ -146,6 +146,12 @@ def behind(delay: float) -> float:
     An attitude that is interpolated may be further back than in proportion to time: by less than a fortieth, where the body
     turns by no more than 2 rad in a period."""
     return 1.025 * delay
+
+
+def latest(delay: float, jitter: float) -> float:
+    """Return the longest time (s) from the instant at which a sensor is read, or to it, and the instant of the reading. One
+    that lies outside the control period of the dead time is extrapolated, which is nearer than in proportion to time."""
+    return delay + DEVIATIONS * jitter
 
 
 def awaited(sensor: Any, late: Late, state: Any, names: Sequence[str]) -> Any:

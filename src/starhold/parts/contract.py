@@ -47,7 +47,8 @@ class Errors(NamedTuple):
     error that a filter removes. Beside them errors may grow with the motion: `turning`, of the attitude with the body's
     rate (s); `turned`, of the rate with that (1); and `late`, of the rate with the body's acceleration (s). They are those
     of the last `ago` seconds, in the state of which before the start nothing changed, on a body that turns by no more
-    than 2 rad in a control period."""
+    than 2 rad in a control period. gaussian: how many Gaussian vectors they depend on at each reading, which are no longer
+    than they are assumed to be."""
 
     attitude: float = 0.0
     rate: float = 0.0
@@ -57,6 +58,7 @@ class Errors(NamedTuple):
     turned: float = 0.0
     late: float = 0.0
     ago: float = 0.0
+    gaussian: int = 0
 
     @property
     def grow(self) -> bool:
@@ -87,6 +89,42 @@ class Noise(NamedTuple):
     torque: float = 0.0
 
 
+class Sky(NamedTuple):
+    """Bounds on an orbit's surroundings, from which sensors bound their errors of directions: the least strength of the
+    magnetic field (T), how much the field's direction changes with the place (rad/m), the least distance from the Earth's
+    centre (m), and the largest speed (m/s)."""
+
+    weakest: float
+    turning: float
+    distance: float
+    speed: float
+
+
+class Direction(NamedTuple):
+    """How far off a measured direction is. It is that of a + d + n: a the true one of unit length as the body had it `late`
+    seconds ago, |d| at most `error`, `inf` for no bound, and n Gaussian, of the standard deviation `deviation` on each axis,
+    independent at each reading, new every `every` control periods. of: "sun", "field" or "nadir"."""
+
+    of: str
+    error: float
+    deviation: float = 0.0
+    late: float = 0.0
+    every: int = 1
+
+    @property
+    def most(self) -> float:
+        """The largest |d + n|, where n is no longer than Gaussian vectors are assumed to be."""
+        return self.error + DEVIATIONS * self.deviation
+
+
+class Place(NamedTuple):
+    """How far off a measured position is at most (m), where the Gaussian vectors on which it depends, so many at a reading,
+    are no longer than they are assumed to be."""
+
+    error: float
+    gaussian: int = 0
+
+
 class Recursion(NamedTuple):
     """The linear recursion by which noise drives small errors of the estimate. At a control step an equation maps `errors`
     and the standard normal `noise` of rate, bias and each attitude, tuples of vectors, to the errors at the next step and
@@ -102,6 +140,8 @@ class Recursion(NamedTuple):
     """Number of vectors of noise."""
     lag: float = 0.0
     """How much of the body's acceleration (s) is at most an error of the rate that counts until the next step."""
+    biased: bool = False
+    """Whether a constant bias of the gyro stays in the rate."""
 
 
 class Envelope(NamedTuple):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache, reduce
-from math import ceil, cos, factorial, pi, radians, sqrt
+from itertools import product
+from math import ceil, cos, factorial, inf, pi, radians, sqrt
 from typing import Any, NamedTuple, TypeAlias
 
 from starhold.algebra.circular import cosine_sine
@@ -29,6 +30,10 @@ FIRST, LAST = (days_of((year, 1.0, 1.0, 0.0, 0.0, 0.0)) for year in (2025.0, 203
 """Range of validity of the coefficients, in days since J2000."""
 GRID = radians(2.0)
 """The angle between points at which the field is computed for a bound on its strength."""
+COARSE, DIVISIONS, CELLS, STEP, CLOSE = radians(5.0), 16, 20_000, 10.0, 0.98
+"""Of the search for the least strength: half the angle of its first cells, how often cells are divided, and how many there
+may be; the distance (m) of the points that give a derivative; and the share of the least strength that is shown."""
+MORE = 1.0 + 1e-9
 Row: TypeAlias = tuple[int, int, float, float, float, float]
 ROWS: tuple[Row, ...] = (
     (1, 0, -29350.0, 0.0, 12.6, 0.0),
@@ -138,6 +143,77 @@ def strongest(epoch: Date, distance: float) -> float:
         most = max(most, float(np.linalg.norm(evaluated(program, position=place, **given), axis=0).max()))
     # No place is as far from its nearest on the grid as three quarters of the grid's step.
     return most / cos((ROWS[-1][0] + 1) * 0.75 * GRID)
+
+
+@cache
+def steepest(epoch: Date, distance: float, order: int = 1) -> float:
+    """Return a bound on the norm of the field's derivatives of an order, 1 or 2, with respect to the place (T/m, T/m2), from
+    a distance (m) from the Earth's centre on.
+
+    Of a degree n the squares of all derivatives of the potential of the order k, summed over the harmonics of a unit
+    coefficient, are c_k (RADIUS/r)^(2n + 2k + 2)/RADIUS^(2k - 2): c_0 = 1, because the squares of such harmonics add up to
+    that, and c_k = (n + k)(2n + 2k - 1) c_(k-1), half the Laplacian of the last. The rest is Cauchy-Schwarz."""
+    squares: dict[int, float] = {}
+    for n, _, g, h in _at(_known(epoch), ROWS):
+        squares[n] = squares.get(n, 0.0) + g * g + h * h
+    total = 0.0
+    for n, square in squares.items():
+        for k in range(1, order + 2):
+            square *= (n + k) * (2 * n + 2 * k - 1)
+        total += sqrt(square) * (RADIUS / distance) ** (n + 2 + order)
+    return 1e-9 * total / RADIUS**order * MORE
+
+
+@cache
+def weakest(epoch: Date, nearest: float, farthest: float) -> float:
+    """Return a strength (T) that the field nowhere falls below between two distances (m) from the centre of the Earth;
+    within 2 % of the least, or 0 where none is found.
+
+    In a cell of distance, latitude and longitude about a point p the strength is no less than the component along the field
+    at p, of which the first derivatives there are computed, and `steepest` bounds the second. Cells in which that is less
+    are divided."""
+    import numpy as np
+
+    from starhold.trace.straight_line import evaluated, straight_line
+
+    def equation(position: Vector, cosines: Any, sines: Any) -> Vector:
+        return earth_fixed(position, numbers._replace(cosines=cosines, sines=sines))
+
+    def at(places: Any) -> Any:
+        return np.array(evaluated(program, position=tuple(places), **given))
+
+    numbers = prepared(epoch)
+    given: dict[str, Any] = {"cosines": numbers.cosines, "sines": numbers.sines}
+    program = straight_line(equation, position=(0.0, 0.0, 0.0), **given)
+    half = np.array([(farthest - nearest) / 2.0, COARSE, COARSE])
+    axes = [np.arange(-limit + COARSE, limit, 2.0 * COARSE) for limit in (pi / 2.0, pi)]
+    cells = np.array([x.ravel() for x in np.meshgrid((nearest + farthest) / 2.0, *axes)])
+    curved, least = steepest(epoch, nearest, 2), inf
+    for _ in range(DIVISIONS):
+        r, latitude, longitude = cells
+        across, height = np.cos(latitude), np.sin(latitude)
+        places = r * np.array([across * np.cos(longitude), across * np.sin(longitude), height])
+        steps = STEP * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)])
+        fields = at((places[:, None] + steps.T[:, :, None]).reshape(3, -1)).reshape(3, len(steps), -1)
+        strength = np.linalg.norm(fields[:, 0], axis=0)
+        slopes = np.einsum("ik,ijk->jk", fields[:, 0] / strength, fields[:, 1:4] - fields[:, 4:]) / (2.0 * STEP)
+        # From the middle of a cell along the radius, the meridian and a parallel to any of its points.
+        parallel = np.minimum(np.cos(np.maximum(np.abs(latitude) - half[1], 0.0)), 1.0)
+        away = np.sqrt(half[0] ** 2 + (r + half[0]) ** 2 * (half[1] + parallel * half[2]) ** 2) * MORE
+        least = min(least, float(strength.min()))
+        first = np.linalg.norm(slopes, axis=0) + curved * STEP
+        cells = cells[:, strength - first * away - curved * away**2 / 2.0 < CLOSE * least]
+        if not cells.size:
+            return float(f"{CLOSE * least:.6g}") * (1.0 - 1e-5)
+        if cells.shape[1] > CELLS:
+            return 0.0
+        # In two across their longest sides.
+        lengths = half * (1.0, farthest, farthest)
+        parted = lengths > lengths.max() / 2.0
+        half = np.where(parted, half / 2.0, half)
+        corners = np.array([x for x in product((-1, 0, 1), repeat=3) if np.all((np.array(x) != 0) == parted)]).T
+        cells = (cells[:, :, None] + (half[:, None] * corners)[:, None, :]).reshape(3, -1)
+    return 0.0
 
 
 def _known(epoch: Date) -> float:

@@ -14,7 +14,7 @@ from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.lates import alike
 from starhold.certification.matrices import floats
 from starhold.certification.measured import driven_errors
-from starhold.certification.unmodelled import noisy_fields, samples_of
+from starhold.certification.unmodelled import gaussian_vectors, samples_of
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.theorems.noise import (
@@ -100,7 +100,7 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
     numbers = {SHARE: RARELY, "samples": samples, "every": every, "noise.attitude": radii[0], "noise.rate": radii[1]}
     if noise.torque:
         numbers |= {DEVIATION: noise.torque, "noise.torque": radius(noise.torque, SHARES[0])}
-    if vectors := noisy_fields(loop.loop):
+    if vectors := gaussian_vectors(loop.loop):
         numbers |= {BESIDE: DEVIATIONS} | ({VECTORS: float(vectors)} if vectors > 1 else {})
     evidence = {
         "covariances": [[[float.hex(x) for x in row] for row in pair.tolist()] for pair in shapes],

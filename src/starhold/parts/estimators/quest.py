@@ -12,10 +12,10 @@ from starhold.algebra.quaternion import Quaternion, normalise, stretch
 from starhold.algebra.scalar import Scalar, Truth, absolute, both, either, less, maximum, where
 from starhold.algebra.structure import chosen
 from starhold.algebra.vector import Vector, cross, determinant, dot, scale
-from starhold.parts import magnetic_field, sun, vectors
-from starhold.parts.contract import Card, Parameter
+from starhold.parts import directions, magnetic_field, sun, vectors
+from starhold.parts.contract import Card, Direction, Errors, Noise, Parameter
 from starhold.parts.craft import Craft
-from starhold.parts.directions import APART, Estimate, Memory, attitude_at_start, measured_or_carried
+from starhold.parts.directions import APART, Estimate, Memory, attitude_at_start, fixed, measured_or_carried
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.vectors import TINY, Known, Pair, known_from, pairs_of
@@ -40,9 +40,11 @@ ABOUT = "Earth"
 NEEDS = ("sun", "sun_is_seen", "magnetic_field", "position", "rate")
 SEVERAL = vectors.SEVERAL
 FIRST = {"attitude_age": 0.0, "is_valid": 0.0}
+ROUNDED = 1e-14
+"""The error (rad) of the computed attitude over the square of the ratio of the largest to the least eigenvalue of F."""
 STEPS = 8
 """Number of Newton steps from the sum of the weights down to the largest eigenvalue."""
-remember = attitude_at_start
+remember, recursion = attitude_at_start, directions.recursion
 
 
 class Params(NamedTuple):
@@ -112,6 +114,50 @@ def best(pairs: list[Pair], clear: Truth) -> Quaternion:
         other = absolute(adjugate[i][i])
         longest, size = chosen(less(size, other), adjugate[i], longest), maximum(size, other)
     return normalise(stretch(1.0 / maximum(size, TINY), longest))
+
+
+def combined(params: Params, seen: tuple[Direction, ...]) -> tuple[Errors, Noise] | None:
+    """Return errors and noise of the attitude from these directions, of which at least two are available that are `apart`;
+    None for too large errors.
+
+    Let r_i be the true unit vectors, b_i = r_i + d_i the measured ones, those of r_i + x_i, w_i the weights, and F = sum w
+    (1 - r r'). Where the weighted sum of squares is least, sum w b x Rr = 0 for the rotation R by an angle T about a, or
+    sin T F a + (1 - cos T)(sum w r r')a x a + sum w d x Rr = 0. Let E^2 = sum w |d|^2. Multiplied by a it gives sin T
+    (a.F a)^(1/2) <= E, because |a x Rr| = |a x r| and a.F a = sum w |a x r|^2; and sin T/2 (a.F a)^(1/2) <= E, because the
+    sum is no more than at T = 0, so that T is less than a quarter turn where 2 E^2 < f, the least eigenvalue of F. To the
+    first order T a is e = F^-1 sum w r x x, of a norm of at most (sum w |x|^2/f)^(1/2), and of the covariance F^-1 for noise
+    with the variances 1/w (Shuster and Oh, 1981), at most that times the largest ratio of variances.
+
+    Beyond the first order: F has the eigenvalues f_1 <= f_2 <= f_3, with W = sum w = (f_1 + f_2 + f_3)/2, f_3 <= W and f_3 -
+    f_2 <= f_1. (sum w r r')a x a has the components (f_2 - f_3) a_2 a_3, …, each over its f_k no more than |a_2 a_3|, …,
+    while sin T |a_k| <= E/f_k^(1/2): with f_2 f_3 >= W^2/3 the second term is at most E^2 (6/f W)^(1/2)/(1 + cos T). The sum
+    of w d x (Rr - r) is at most E^2/cos T/2, for |Rr - r| = 2 sin T/2 |a x r|; d is x across r but for |x|^2/(1 - |x|). For
+    two directions alone 2f = W - (W^2 - 4 w_1 w_2 sin^2)^(1/2), and others make F larger. The last term is for rounding."""
+    weigh = {kind: getattr(params, kind) ** -2.0 for kind in vectors.KINDS}
+    given = [(weigh[one.of], one) for one in seen]
+    squares, weakest, whole = [0.0, 0.0, 0.0], math.inf, math.inf
+    for weight, one in given:
+        if not one.most < 0.5:
+            return None
+        chord = (one.most, one.error, one.most**2 / (1.0 - one.most))
+        squares = [square + weight * x * x for square, x in zip(squares, (math.asin(chord[0]), *chord[1:]), strict=True)]
+    for (w, first), (v, second) in combinations(given, 2):
+        angle = params.apart - math.asin(first.most) - math.asin(second.most)
+        if angle <= 0.0:
+            return None
+        product = w * v * math.sin(angle) ** 2
+        least = 2.0 * product / (w + v + math.sqrt((w + v) ** 2 - 4.0 * product))
+        weakest, whole = min(weakest, least), min(whole, least * (w + v))
+    large, steady, bent = (square / weakest for square in squares)
+    if len(given) < 2 or not 2.0 * large < 1.0:
+        return None
+    sine = math.sqrt(large)
+    angle, cosine = math.asin(sine), math.sqrt(1.0 - large)
+    second = large * weakest * math.sqrt(6.0 / whole) / (1.0 + cosine) + large / math.cos(angle / 2.0)
+    error = (
+        math.sqrt(steady) + math.sqrt(bent) + second + (angle - sine) + ROUNDED * (sum(w for w, _ in given) / weakest) ** 2
+    )
+    return fixed(seen, error, math.sqrt(max(w * one.deviation**2 for w, one in given) / weakest))
 
 
 UNTURNED = ((1.0, 0.0, 0.0, 0.0), (0.0, -1.0 / 3.0, 0.0, 0.0), (0.0, 0.0, -1.0 / 3.0, 0.0), (0.0, 0.0, 0.0, -1.0 / 3.0))

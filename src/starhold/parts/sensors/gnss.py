@@ -8,7 +8,7 @@ from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add
 from starhold.parts import as_built
-from starhold.parts.contract import Card, NoMemory, Parameter
+from starhold.parts.contract import DEVIATIONS, Card, NoMemory, Parameter, Place, Sky
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -62,6 +62,12 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     away, faster = dice.vectors(0, params.position, params.velocity)
     reading = Reading(add(state.position, away), add(state.velocity, faster))
     return reading, as_built.kept(memory, waiting)
+
+
+def place(params: Params, sky: Sky) -> Place:
+    """Return how far off the position is, by noise and by the way that the craft goes until a reading arrives."""
+    error = DEVIATIONS * params.position + sky.speed * as_built.latest(params.delay, params.jitter)
+    return Place(error, (params.position > 0.0) + (params.jitter > 0.0))
 
 
 def examples() -> list[Params]:

@@ -137,17 +137,19 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 def error(params: Params) -> Errors:
     """Return the initial bias and half a step of the resolution, what scale factor and axes make of the rate, and its change
-    during a delay; errors that wander have no bound, nor has a reading that is clipped."""
-    if as_built.is_given(params.bias_instability, params.jitter) or params.limit < math.inf:
+    during a delay with jitter; errors that wander have no bound, nor has a reading that is clipped."""
+    if as_built.is_given(params.bias_instability) or params.limit < math.inf:
         return UNBOUNDED
+    late = as_built.latest(params.delay, params.jitter)
     factor, bias = 1.0 + params.scale_error, math.hypot(*params.bias)
     axes = as_built.axes_of(params.mounting_error, params.axis_errors) or IDENTITY
     return Errors(
         rate=bias + as_built.off_step(params.resolution),
         bias=bias,
         turned=as_built.stretch(multiply(diagonal((factor, factor, factor)), axes)),
-        late=params.delay,
-        ago=params.delay,
+        late=late,
+        ago=late,
+        gaussian=int(params.jitter > 0.0),
     )
 
 

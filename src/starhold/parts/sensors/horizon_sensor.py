@@ -11,9 +11,9 @@ from starhold.algebra.scalar import Scalar, both, less, maximum, opposite, sqrt,
 from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, unit
 from starhold.parts import as_built
 from starhold.parts.boresight import BORESIGHT, THIRD, field_cosine, unit_boresight
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Direction, Parameter, Sky
 from starhold.parts.orbit import BODIES
-from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out
+from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out, steps_of
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -103,6 +103,17 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     shown = unit(add(add(down, moved), dice.vector(0, params.noise)))
     reading: Any = tuple(where(visible, x, 0.0) for x in shown)
     return Reading(reading, where(visible, 1.0, 0.0)), as_built.kept(memory, waiting)
+
+
+def direction(params: Params, period: float, sky: Sky) -> Direction:
+    """Return what mounting, the limb's height and a delay of the position do to a direction that is seen, and its noise; no
+    bound with jitter, and in an orbit through the Earth."""
+    every, square = int(steps_of(params.interval, period)), sky.distance * sky.distance - RADIUS * RADIUS
+    if as_built.is_given(params.jitter) or square <= 0.0:
+        return Direction("nadir", math.inf, every=every)
+    skewed = as_built.stretch(as_built.axes_of(params.mounting_error, ZERO))
+    error = skewed + abs(params.limb_height) / math.sqrt(square) + params.delay * sky.speed / sky.distance
+    return Direction("nadir", error, params.noise, params.delay, every)
 
 
 def examples() -> list[Params]:

@@ -10,9 +10,9 @@ from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, sqrt, where
 from starhold.algebra.vector import ZERO, Matrix, Vector, add, scale
 from starhold.parts import as_built, magnetic_field
-from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
+from starhold.parts.contract import DEVIATIONS, NO_ERRORS, UNBOUNDED, Card, Direction, Errors, Noise, Parameter, Sky
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out
+from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out, steps_of
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -121,6 +121,22 @@ def error(params: Params) -> Errors:
     share = abs(params.scale_error) * (1.0 + skewed) + skewed
     scaled = share * magnetic_field.strongest(params.epoch, magnetic_field.GROUND)
     return NO_ERRORS._replace(field=scaled + math.hypot(*params.bias) + as_built.off_step(params.resolution))
+
+
+def direction(params: Params, period: float, sky: Sky) -> Direction:
+    """Return what axes, bias, resolution and a delay of the position do to the direction of a new reading, and its noise; no
+    bound with jitter, and where the field may reach the limit. A scale factor turns no direction."""
+    every, deviation = int(steps_of(params.interval, period)), float(_deviation(params, period))
+    added, factor = math.hypot(*params.bias) + as_built.off_step(params.resolution), 1.0 + params.scale_error
+    skewed = as_built.stretch(as_built.axes_of(params.mounting_error, params.axis_errors))
+    largest = magnetic_field.strongest(params.epoch, magnetic_field.GROUND) if params.limit < math.inf else 0.0
+    clipped = factor * (1.0 + skewed) * largest + added + DEVIATIONS * deviation > params.limit
+    if as_built.is_given(params.jitter) or clipped:
+        return Direction("field", math.inf, every=every)
+    least = factor * sky.weakest
+    # The axes act on the field of where the craft was.
+    error = skewed + (1.0 + skewed) * params.delay * sky.speed * sky.turning + added / least
+    return Direction("field", error, deviation / least, params.delay, every)
 
 
 def noise(params: Params, period: float) -> Noise:

@@ -151,12 +151,13 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """Return the mounting error, and the craft's rotation during a delay; no bound where readings may stop."""
+    """Return the mounting error, and the craft's rotation during a delay with jitter; no bound where readings may stop."""
     silent = params.outage != NEVER or params.sun_cone or params.moon_cone or any(params.limb_cones)
-    if as_built.is_given(params.jitter) or silent or params.rate_limit < math.inf:
+    if silent or params.rate_limit < math.inf:
         return UNBOUNDED
-    late = {"turning": as_built.behind(params.delay), "ago": params.delay}
-    return NO_ERRORS._replace(attitude=math.hypot(*params.mounting_error), **late)
+    late, gaussian = as_built.latest(params.delay, params.jitter), int(params.jitter > 0.0)
+    turned = math.hypot(*params.mounting_error)
+    return NO_ERRORS._replace(attitude=turned, turning=as_built.behind(late), ago=late, gaussian=gaussian)
 
 
 def noise(params: Params, period: float) -> Noise:

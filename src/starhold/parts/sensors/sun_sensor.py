@@ -12,10 +12,10 @@ from starhold.algebra.vector import ZERO, Vector, add, dot, unit
 from starhold.algebra.words import number_of
 from starhold.parts import as_built, sun
 from starhold.parts.boresight import BORESIGHT, THIRD, field_cosine, unit_boresight
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Direction, Parameter, Sky
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out
+from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out, steps_of
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -102,6 +102,12 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     shown = unit(add(toward, dice.vector(0, params.noise)))
     reading: Any = tuple(where(visible, x, 0.0) for x in shown)
     return Reading(reading, where(visible, 1.0, 0.0)), as_built.kept(memory, waiting)
+
+
+def direction(params: Params, period: float, sky: Sky) -> Direction:
+    """Return the mounting error and the noise of a direction that is seen; no bound with jitter."""
+    error = math.inf if as_built.is_given(params.jitter) else as_built.stretch(as_built.axes_of(params.mounting_error, ZERO))
+    return Direction("sun", error, params.noise, params.delay, int(steps_of(params.interval, period)))
 
 
 def examples() -> list[Params]:

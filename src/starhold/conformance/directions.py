@@ -1,0 +1,100 @@
+"""Checks what sensors say of their errors of directions, and estimators of the attitudes that they compute from these."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from math import asin, atan2
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from starhold.algebra.quaternion import conjugate, multiply, to_body, vector_part
+from starhold.algebra.structure import unflatten
+from starhold.algebra.vector import ZERO, Vector, add, cross, dot, norm, scale, unit
+from starhold.conformance.bench import anywhere, moving
+from starhold.conformance.verdicts import STEPS
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts import as_built, magnetic_field, sun
+from starhold.parts.contract import Direction, Sky
+from starhold.parts.epoch import START
+from starhold.parts.part import Part
+from starhold.parts.random import Silent
+from starhold.parts.vectors import KINDS
+
+OFF = {"sun": 0.002, "field": 0.005, "nadir": 0.003}
+"""The errors of directions from which estimators compute attitudes here."""
+
+
+def tells(part: Part) -> bool:
+    """Return whether a part says its errors of directions, or of attitudes computed from these."""
+    return part.hook({"sensor": "direction", "estimator": "combined"}.get(part.role, "")) is not None
+
+
+def misdirected(part: Part, loop: ClosedLoop) -> Iterator[tuple[str, float, float]]:
+    """Yield the errors of a part that tells them, with their bounds."""
+    if tells(part):
+        yield from _of_sensor(part, loop) if part.role == "sensor" else _of_estimator(part, loop)
+
+
+def _of_sensor(part: Part, loop: ClosedLoop) -> Iterator[tuple[str, float, float]]:
+    """Yield errors of the directions that a sensor measures without noise, and their bounds, where the field is as strong as
+    at the start."""
+    fitted = next(f for f in loop.parts if f.part == part)
+    module, random, numbers = part.module, np.random.default_rng(1), fitted.prepared(loop.period)
+    memory, params = fitted.remembered(numbers, loop.start), fitted.params
+    there = _directions(params, loop.start.position, 0.0)
+    strength, distance = there.pop("strength"), norm(loop.start.position)
+    sky = Sky(strength, magnetic_field.steepest(getattr(params, "epoch", START), distance) / strength, distance, 0.0)
+    said: Direction = module.direction(params, loop.period, sky)
+    states = (moving if said.late else anywhere)(loop, random)
+    for step, (state, fast, _) in enumerate(islice(states, 2 * STEPS)):
+        reading, memory = module.measure(state, memory, numbers, Silent(), step)
+        name, *flags = KINDS[said.of]
+        seen = getattr(reading, name)
+        if norm(seen) > 0.0 and all(
+            getattr(reading, flag, 1.0) > 0.5 for flag in (*flags, f"{name}_is_new", f"{name}_is_seen")
+        ):
+            true = to_body(state.attitude, _directions(params, state.position, step * loop.period)[said.of])
+            off = atan2(norm(cross(seen, true)), dot(seen, true))
+            yield "error of the direction", off, asin(min(said.error, 1.0)) + as_built.behind(said.late) * fast
+
+
+def _of_estimator(part: Part, loop: ClosedLoop) -> Iterator[tuple[str, float, float]]:
+    """Yield errors of the attitudes that an estimator computes from directions with errors, and their bound."""
+    fitted = next(f for f in loop.parts if f.part == part)
+    module, random, params = part.module, np.random.default_rng(1), fitted.params
+    kinds = [kind for kind, (name, *_) in KINDS.items() if {name} & {*module.NEEDS, *getattr(module, "SEVERAL", ())}]
+    given = module.combined(params, tuple(Direction(kind, OFF[kind]) for kind in kinds))
+    if given is None:
+        return
+    numbers, distance = fitted.prepared(loop.period), norm(loop.start.position)
+    for _ in range(4 * STEPS):
+        position = scale(distance, unit(_drawn(random)))
+        attitude: Any = tuple((lambda q: q / np.linalg.norm(q))(random.normal(size=4)).tolist())
+        there = _directions(params, position, 0.0)
+        shown: dict[str, Any] = {"position": position, "rate": ZERO, "sun_is_seen": 1.0, "nadir_is_seen": 1.0}
+        for kind in kinds:
+            true = to_body(attitude, there[kind])
+            # Across the direction, as far as it may be.
+            error = scale(OFF[kind], unit(cross(true, _drawn(random))))
+            shown[KINDS[kind][0]] = scale(there["strength"] if kind == "field" else 1.0, unit(add(true, error)))
+        memory = fitted.remembered(numbers, loop.start)
+        estimate, _ = module.estimate(SimpleNamespace(**shown), memory, numbers, loop.craft, loop.period)
+        if estimate.is_valid > 0.5:
+            turn = 2.0 * norm(vector_part(multiply(conjugate(attitude), estimate.attitude)))
+            yield "error of the attitude", turn, given[0].attitude
+
+
+def _directions(params: Any, position: Vector, time: float) -> dict[str, Any]:
+    """Return the unit vectors of Sun, field and nadir at a position (m) and a time (s), in inertial axes, and the field's
+    strength (T)."""
+    epoch = getattr(params, "epoch", START)
+    field = magnetic_field.field(position, time, magnetic_field.prepared(epoch))
+    toward = sun.sun(time, sun.prepared(epoch, getattr(params, "ephemeris", 0))).direction
+    return {"sun": toward, "field": unit(field), "nadir": unit(scale(-1.0, position)), "strength": norm(field)}
+
+
+def _drawn(random: np.random.Generator) -> Vector:
+    return unflatten(random.normal(size=3), ZERO)
