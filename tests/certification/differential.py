@@ -6,7 +6,9 @@ import math
 import numpy as np
 
 import starhold as sh
+from starhold.analysis.departure import start_inside
 from starhold.errors import InputError
+from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.scenario.building import build
 from starhold.scenario.writing import part_table
@@ -75,32 +77,50 @@ def _with(tables, path, value):
     return tables
 
 
-def judged(path, name, claim, base, said, changed, tables):
-    """What is wrong with what is said of other tables with the certificate at a path, and how they were judged. said: what
-    is left open of the scenario that it was made for; claim: that of its law `name` as it flies."""
+def judged(path, issued, said, changed, tables):
+    """Yield, for each law of the certificates at a path, its name, what is wrong with what is said of other tables with
+    its own one, and how they were judged. issued: of each law its name, its certificate, its claim as it flies, if that is
+    proved, and its loop; said: what is left open of the scenario that they were made for."""
     try:
         scenario = sh.scenario(tables)
-        differing, entry = compare_programs(path, scenario), scenario.pick(name)
-        loop = build(scenario, entry)
+        differing = compare_programs(path, scenario)
+        loops = {name: build(scenario, scenario.pick(name)) for name, *_ in issued}
+        left = [text for text in left_open(path, scenario) if text not in said]
     except InputError:
-        return "", "refused"
-    if any(text.startswith(f"{name}: ") for text in differing):
-        return "", "another"
-    if differing or claim is None:
-        return "", "not judged"
-    if [text for text in left_open(path, scenario) if text.startswith(f"{name}: ") and text not in said]:
-        return "", "said"
-    unsaid = [f.called for f in loop.parts if f not in base.parts and not any(map(f.part.hook, SAYING)) and _acts(f)]
-    if unsaid:
-        return f"{changed}: nothing is said of {unsaid}", "silent"
+        yield from ((name, "", "refused") for name, *_ in issued)
+        return
+    for name, certificate, claim, base in issued:
+        if any(text.startswith(f"{name}: ") for text in differing):
+            yield name, "", "another"
+        elif differing or claim is None:
+            yield name, "", "not judged"
+        elif any(text.startswith(f"{name}: ") for text in left):
+            yield name, "", "said"
+        elif not start_inside(certificate, loops[name])["pointing"]:
+            yield name, "", "outside"
+        else:
+            yield name, _unsaid(loops[name], base, changed) or _beyond(loops[name], claim, changed), "silent"
+
+
+def _unsaid(loop, base, changed):
+    """Which parts act of which nothing is said."""
+    parts = [f.called for f in loop.parts if f not in base.parts and not any(map(f.part.hook, SAYING)) and _acts(f)]
+    return f"{changed}: nothing is said of {parts}" if parts else ""
+
+
+def _beyond(loop, claim, changed):
+    """How a flight contradicts a claim."""
     run = label(loop, *fly(loop, STEPS), 1)
     angles = 2.0 * np.arcsin(np.minimum(np.linalg.norm(run.arrays["attitude_error"][:, 1:], axis=1), 1.0))
     for time, most in claim.numbers["funnel"]:
         later = angles[math.ceil(time / loop.period) :]
         if len(later) and later.max() > most * (1.0 + 1e-6):
-            return f"{changed}: {later.max():.3g} rad after {time:.4g} s, and not {most:.3g}", "silent"
-    return "", "silent"
+            return f"{changed}: {later.max():.3g} rad after {time:.4g} s, and not {most:.3g}"
+    return ""
 
 
 def _acts(fitted):
-    return fitted.part.role not in ("environment",) or fitted.part.name not in ("two-body", "gravity-gradient")
+    """Whether a part does more than hold the orbit, pull as laws are told, or show what no law reads by itself."""
+    if fitted.part.role == "sensor":
+        return bool({*fitted.part.module.Reading._fields} & {*State._fields})
+    return fitted.part.name not in ("two-body", "gravity-gradient")

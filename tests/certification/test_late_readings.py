@@ -19,7 +19,7 @@ from starhold.certification.unmodelled import GROWING
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account, RefusedError
-from starhold.kernel.regions import AMISS, RATE, TURN
+from starhold.kernel.regions import AMISS, RATE, SPEED, TURN
 from starhold.kernel.theorems import pointing
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import Noise
@@ -29,7 +29,7 @@ from starhold.scenario.reading import parse
 from starhold.studies.bodies.rigid_body import certified_loops, wanted_of
 from tests.certification.attack import Attack, flown
 from tests.certification.extremal import Steered
-from tests.kernel.flights import along
+from tests.kernel.flights import along, seen, turned_on
 from tests.tiers import leading
 
 OWN = """
@@ -181,6 +181,33 @@ def test_a_smaller_set_counts_once_what_the_body_did_before_is_forgotten(monkeyp
     motion = held(error_rate_per_acceleration=1e3)
     with pytest.raises(RefusedError, match="too long for the rates"):
         motion.tube(motion.region(motion.s / 2**20))
+
+
+def test_errors_beside_noise_take_what_is_told_no_further_than_they_do_without():
+    motion = held(**{"noise.attitude": 0.05, "error.attitude": 0.2})
+    region, T, random = (
+        motion.region((motion.s + motion.G[3][3]) / 2**20),
+        floats(motion.near.torque),
+        np.random.default_rng(4),
+    )
+    x = np.linalg.cholesky(floats(region.X)) @ along(random.normal(size=(6, 4000)))
+    q = np.concatenate([[np.sqrt(1.0 - (x[TURN] ** 2).sum(axis=0))], x[TURN]])
+    noise, error = (size * along(random.normal(size=(3, 4000))) for size in (0.05, 0.2))
+    for told in (turned_on(turned_on(q, noise), error), turned_on(turned_on(q, error), noise)):
+        beside = np.linalg.norm(T[:, TURN] @ (told[1:] - q[1:] - noise / 2.0), axis=0)
+        assert 0.9 < beside.max() / float(motion.misread(region)[1]) <= 1.0
+
+
+def test_errors_that_grow_with_the_motion_do_with_that_of_the_target():
+    """From a rate across the target's, with all that turns both the same way."""
+    fast, slow, own, target, h = 0.3, 0.2, 0.05, 0.07, 1e-6
+    about = SimpleNamespace(moving=[[1, 0], [0, 1]], size={"r": Fraction(slow), "a": Fraction(target)}.get)
+    rate, acceleration = map(float, Held.misleads(about, {SPEED: Fraction(fast)}, Fraction(own)))
+    x, y, z = np.eye(3)[:, :, None]
+    turn = turned_on(np.eye(4)[:, :1], h * fast * x)
+    later = (fast * x - h * own * z) + seen(turn, slow * y - h * target * z)
+    assert np.isclose(np.linalg.norm(later - fast * x - slow * y) / h, acceleration, rtol=1e-5)
+    assert np.isclose(rate, fast + slow)
 
 
 # --- the filter -----------------------------------------------------------------------------------------------------------

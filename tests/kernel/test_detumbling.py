@@ -15,19 +15,21 @@ from starhold.algebra.scalar import divide, less, where
 from starhold.algebra.vector import ZERO, add, cross, dot, scale, subtract
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.detumbling import find_detumbling
-from starhold.certification.evidence.finding import certificate
+from starhold.certification.evidence.finding import certificate, read
 from starhold.certification.evidence.recorded import ASKED
 from starhold.certification.subject import make_subject
 from starhold.kernel.check import check
+from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.programs import digest
+from starhold.kernel.theorems import detumbling
 from starhold.laws import b_dot
 from starhold.loop.modes import loop_of_mode
 from starhold.parts.contract import NoParams, Push
 from starhold.parts.part import Fitted, Part
 from starhold.scenario.building import build
 from starhold.trace.straight_line import straight_line
-from tests.kernel.certificates import rekeyed, text
+from tests.kernel.certificates import failing, rekeyed, text
 from tests.kernel.mutations import refusals
 from tests.kernel.tumbling import Tumbling
 from tests.making import built
@@ -82,6 +84,7 @@ SAYS_MORE = {
     "least moment": ("inertia.low", "101/100"),
     "largest moment": ("inertia.high", "99/100"),
     "turns too far": ("rate.0", "4"),
+    "gyroscopic": ("gyroscopic", "1/2"),
 }
 
 
@@ -147,6 +150,15 @@ def switching(measurement, gains, craft, memory):
     return scale(where(less(0.0, measurement.magnetic_field[0]), 1.0, -1.0), torque), memory
 
 
+def halved(measurement, gains, craft, memory):
+    """Divides by twice the field's square."""
+    field = measurement.magnetic_field
+    square = dot(field, field)
+    share = where(less(0.0, square), divide(-gains.k / measurement.period, 2.0 * square), 0.0)
+    dipole = scale(memory.known * share, subtract(field, memory.field))
+    return cross(dipole, field), b_dot.Memory(field, where(less(0.0, square), 1.0, 0.0))
+
+
 def drifting(measurement, gains, craft, memory):
     field = measurement.magnetic_field
     torque, memory = b_dot.torque(measurement, gains, craft, memory)
@@ -166,12 +178,36 @@ def with_law(law):
     return content
 
 
-@pytest.mark.parametrize("law", [along, stale, idle, undivided, switching, drifting])
+@pytest.mark.parametrize("law", [along, stale, idle, undivided, switching, halved, drifting])
 def test_a_law_that_does_something_else_is_refused_and_breaks_the_claim(law):
     content = with_law(law)
     assert not flown(content).holds()
     with pytest.raises(RefusedError):
         check(text(content))
+
+
+def test_that_the_law_divides_by_the_square_of_the_field_is_a_hypothesis_of_its_own():
+    content = with_law(halved)
+    assert failing(content["claims"][0], content["programs"]) == {"square of the field"}
+
+
+@pytest.mark.parametrize(("number", "factor"), [("outside", 1000), ("outside.across", 10), ("stored", 2)])
+def test_each_torque_may_turn_the_body_faster(number, factor):
+    """The field turns in a body that a torque begins to turn, so that it has to turn faster for its energy to fall."""
+    content = changed(number, str(factor), tumbling("cubesat-mission", "mission"))
+    more = power_of(content) - power_of(tumbling("cubesat-mission", "mission"))
+    numbers = {name: rational(x) for name, x in content["claims"][0]["numbers"].items()}
+    torque = numbers[number] * (1 - Fraction(1, factor)) * (numbers["rate.0"] if number == "stored" else 1)
+    assert more >= torque / numbers["inertia.low"]
+
+
+def power_of(content):
+    """How fast rates may begin to change, as the power of what is across the field has it."""
+    claim = content["claims"][0]
+    loop = AttitudeLoop(read(claim, content["programs"]), quotients=True)
+    numbers, h = loop.claim.numbers, loop.claim.subject["measurement.period"]
+    others = detumbling.power_at(loop, numbers["rate.0"]).others
+    return (detumbling.value(others, 0) - numbers["rate.0"] * numbers["outside"]) / (h * numbers["outside.across"])
 
 
 def led(measurement, gains, craft, memory):
@@ -259,8 +295,13 @@ def test_a_limit_of_the_command_is_one_that_the_law_does_not_reach():
     content = certificate(found.programs, found.claims)
     (proved,) = check(text(content))
     assert "unlimited-torque" not in proved.statement.assumptions
+    numbers = content["claims"][0]["numbers"]
+    gain = rational(content["claims"][0]["subject"]["gains.k"])
+    # What the law asks for where the field does not turn by itself.
+    still = gain * rational(numbers["rate.0"]) / rational(numbers["limit"])
+    assert still < 1
     with pytest.raises(RefusedError, match="limit 0"):
-        check(text(changed("limit", "1/1000", content)))
+        check(text(changed("limit", str(still * Fraction(1000001, 1000000)), content)))
     assert "unlimited-torque" in check(text(tumbling()))[0].statement.assumptions
 
 

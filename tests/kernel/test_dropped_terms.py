@@ -21,7 +21,7 @@ from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import spinning
 from starhold.kernel.numbers import Account, RefusedError, scalar
 from starhold.kernel.polynomials import Poly, var
-from starhold.kernel.regions import ANGLE, AT_REST, RATE, SPEED, STATE, TURN, felt
+from starhold.kernel.regions import ANGLE, AT_REST, LOAD, RATE, SPEED, STATE, TURN, felt
 from starhold.kernel.theorems.noise import driven
 from tests.kernel.flights import Around, Surroundings, along, cross, stepped
 from tests.kernel.oracle import Oracle, run
@@ -173,7 +173,8 @@ def sizes_of(held, *states):
     sizes = {f"q{k}": Fraction(np.abs(x).max()) for k, x in enumerate(q)}
     sizes |= {name: Fraction(np.abs(x).max()) for name, x in zip(STATE, w, strict=False)}
     lengths = {SPEED: w, ANGLE: q[1:]}
-    return held.others | sizes | {name: Fraction(np.linalg.norm(v, axis=0).max()) for name, v in lengths.items()}
+    sizes |= {name: Fraction(np.linalg.norm(v, axis=0).max()) for name, v in lengths.items()}
+    return held.others | sizes | {LOAD: Fraction(0)}
 
 
 ALIKE = [

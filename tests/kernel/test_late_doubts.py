@@ -41,9 +41,11 @@ def plain():
 
 
 class Lagging:
-    """A loop with a lag (s), and a law -K q - c (q1^3, q2^3, q3^3) - C w + w x Jw."""
+    """A loop with a lag (s), and a law -K q - c (q1^3, q2^3, q3^3) - C w + w x Jw: K and C are a number, or one for each
+    axis. `held`: the stiffness of a V, in place of K, that has no cross term; `errors`:
+    numbers of the claim."""
 
-    def __init__(self, J, h, lag, stiff, damped, cubic=0.0, *, alike=True, **late):
+    def __init__(self, J, h, lag, stiff, damped, cubic=0.0, *, held=None, alike=True, errors=(), **late):
         Account.left = 10**13
         self.J, self.h, self.lag, self.kept = J, h, lag, np.exp(-h / lag)
         told = {"kept": self.kept * (1 + 1e-9), "mean": lag / h * (1 - self.kept) * (1 + 1e-9)}
@@ -51,16 +53,17 @@ class Lagging:
         if alike:
             told["moment"] = lag / h * (1 - told["mean"]) * (1 + 2e-9)
             told |= {f"{name}.least": told[name] * (1 - 4e-9) for name in ("kept", "mean", "moment")}
-        n = {"period": h, "outside": 1e-14, "error": 1e-14} | {f"outside.{k}": 1e-14 for k in range(3)}
+        n = {"period": h, "outside": 1e-14, "error": 1e-14} | {f"outside.{k}": 1e-14 for k in range(3)} | dict(errors)
         base, own = plain()
         claim = own.claim(own.leans[0][1], n | {f"late.torque.{name}": x for name, x in (told | late).items()})
         inertia = {f"body.inertia.{i}.{k}": str(Fraction(float(J[i, k]))) for i in range(3) for k in range(i, 3)}
         loop = AttitudeLoop(read(claim | {"subject": claim["subject"] | inertia}, base.by_digest))
-        K, C, c = map(Fraction, (stiff, damped, cubic))
+        (K, C), c = ([Fraction(x) for x in np.broadcast_to(part, 3)] for part in (stiff, damped)), Fraction(cubic)
         q, w, spun = loop.q[1:], loop.w, cross(loop.w, apply(loop.given, loop.w))
-        self.u = [-(K * x + c * x * x * x) - C * y + s for x, y, s in zip(q, w, spun, strict=True)]
-        lean, Jw = Fraction(0.3 * stiff / damped), apply(loop.given, w)
-        V = 2 * K * (1 - loop.q[0]) + Fraction(1, 2) * dot(w, Jw) + lean * dot(q, Jw) + lean * C / 2 * dot(q, q)
+        self.u = [-(k * x + c * x * x * x) - d * y + s for k, d, x, y, s in zip(K, C, q, w, spun, strict=True)]
+        k, Jw = Fraction(held or K[0]), apply(loop.given, w)
+        lean = Fraction(0 if held else 0.3 * stiff / damped)
+        V = 2 * k * (1 - loop.q[0]) + Fraction(1, 2) * dot(w, Jw) + lean * dot(q, Jw) + lean * C[0] / 2 * dot(q, q)
         loop.__dict__ |= {"u": self.u, "lyapunov": V}
         self.held = Held(loop)
 
@@ -160,8 +163,10 @@ def test_a_claim_says_that_components_near_what_is_asked_for_alike_where_it_uses
     for alike in (True, False):
         numbers = {x: one["numbers"][x] for x in one["numbers"] if not x.endswith(".least") and x != "late.torque.moment"}
         if alike:
-            numbers["late.torque.moment"] = one["numbers"].get("late.torque.moment", "1/3")
-            numbers |= {f"late.torque.{x}.least": numbers[f"late.torque.{x}"] for x in ("kept", "mean", "moment")}
+            numbers |= {x: y for x, y in one["numbers"].items() if x not in numbers}
+            numbers.setdefault("late.torque.moment", "1/3")
+            for x in ("kept", "mean", "moment"):
+                numbers.setdefault(f"late.torque.{x}.least", numbers[f"late.torque.{x}"])
         try:
             (proved,) = check(json.dumps(certificate(programs, [one | {"numbers": numbers}])))
         except RefusedError:

@@ -1,11 +1,17 @@
-"""What is computed of several rows at once where one lane flies a built-in scenario, and what is put into another order."""
+"""What is computed of several rows at once where one lane flies a built-in scenario, what is put into another order, and
+what is prepared."""
 
+from collections import Counter
+from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 
 from starhold.loop.kernels import Numbers, make_step
 from starhold.loop.programs import one
+from starhold.parts.part import Fitted
+from starhold.simulation.lane import fly
 from starhold.trace.ordering import ordered
 from starhold.trace.program import Call, Loop, Op, statements
 from starhold.trace.rows import unrolled
@@ -62,3 +68,18 @@ def test_all_but_the_flexible_panels_are_put_into_another_order(name):
     before, after = ([s.ref for s in step(p) if isinstance(s, Op)] for p in (program(name), ordered(program(name))))
     assert (before == after) is (name == "flexible-slew")
     assert sorted(before) == sorted(after)
+
+
+def test_the_parts_of_a_loop_are_prepared_once_for_all_its_flights(monkeypatch):
+    loop, prepared, prepare = replace(built("cubesat-nadir"), events=()), Counter(), Fitted.prepared
+
+    def counted(self, period):
+        prepared[self.called] += 1
+        return prepare(self, period)
+
+    monkeypatch.setattr(Fitted, "prepared", counted)
+    first = fly(loop, 2)
+    assert "drag" in prepared
+    assert set(prepared.values()) == {1}
+    assert np.array_equal(fly(loop, 2)[0], first[0])
+    assert set(prepared.values()) == {1}

@@ -1,6 +1,8 @@
-"""What other machines are given: every operation on numbers rounds to nearest, and none is fused with another."""
+"""What machines are given: every operation on numbers rounds to nearest, and none is fused with another; and how this one
+stores what has no room in registers."""
 
 import ctypes
+import platform
 import re
 from collections import Counter
 from typing import Any
@@ -16,6 +18,7 @@ from starhold.algebra.operations import INDEX, WORD
 from starhold.algebra.scalar import less, sqrt, where
 from starhold.algebra.structured import Buffer, function, repeat, until
 from starhold.algebra.words import number_in, number_of, word_add, word_and
+from starhold.trace import machine as loading
 from starhold.trace.llvm import Llvm
 from starhold.trace.machine import word
 from starhold.trace.program import Memory
@@ -152,6 +155,20 @@ def test_the_same_text_compiles_for_other_machines_and_nothing_is_fused(name: st
     found = instructions(text)
     assert not FUSED.search(text), FUSED.findall(text)
     assert all(found[instruction] for instruction in NAMES[name]), found
+
+
+@pytest.mark.skipif(platform.machine().lower() not in ("x86_64", "amd64"), reason="of this processor's registers")
+def test_what_a_kernel_keeps_on_the_stack_is_aligned() -> None:
+    def crowded(x: Buffer, y: Buffer, _: Any) -> None:
+        """More numbers at once than registers."""
+        roots = [sqrt(x[k]) + 1.0 / (k + 3) for k in range(x.size)]
+        y.put(0, (root * sum(roots) for root in roots))
+
+    program = Subject(crowded, (Memory("x", True, False, 48), Memory("y", True, True, 48)), {}).program()
+    module = llvm.parse_assembly(str(Llvm(program, 8)))
+    text = loading._machine().emit_assembly(module)
+    assert re.search(r"\bv?movap[sd]\s.*\(%r[sb]p\)", text)
+    assert not re.search(r"\bv?movup[sd]\s.*\(%r[sb]p\)", text)
 
 
 def test_a_machine_that_llvm_does_not_know_is_an_error() -> None:

@@ -41,13 +41,16 @@ def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
 
 def leaves(value: Any) -> Iterator[Any]:
     """Yield the leaves of a nested value in order; None and () have none."""
-    left = [value]
+    left: list[Iterator[Any]] = [iter((value,))]
     while left:
-        part = left.pop()
-        if isinstance(part, tuple):
-            left += cast(tuple[Any, ...], part)[::-1]
-        elif part is not None:
-            yield part
+        for part in left[-1]:
+            if isinstance(part, tuple):
+                left.append(iter(cast(tuple[Any, ...], part)))
+                break
+            if part is not None:
+                yield part
+        else:
+            left.pop()
 
 
 def mapped(value: Any, leaf: Callable[[Any], Any]) -> Any:

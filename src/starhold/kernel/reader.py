@@ -78,9 +78,8 @@ class Reader(ABC):
         away, (turned, rated) = sizes[ANGLE], self.noise
         near = sizes | {"v": away * away}
         linear = {"q": turned / 2, "w": rated}
-        # Other errors turn it too.
-        apart = (self.misled(region.sizes)[0] - turned) * turned / 2
-        curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8 + apart, "w": Fraction(0)}
+        # Other errors, before it or after, take this no further than they take q.
+        curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
         less = [(full[k] - felt(self.unlike, k, near)) * x - full[k] * curved[k] for k, x in linear.items()]
         return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.misled(region.sizes)[0] / 2)
 

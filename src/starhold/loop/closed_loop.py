@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -272,6 +273,11 @@ class ClosedLoop:
 
     def setup(self) -> Setup:
         """The numbers of this loop."""
+        return self._setup
+
+    @cached_property
+    def _setup(self) -> Setup:
+        # Each flight asks for it several times, and to prepare parts takes as long as a thousand control steps.
 
         def prepared(role: str) -> tuple[Any, ...]:
             return tuple(fitted.prepared(self.period) for fitted in self.used(role))
@@ -302,8 +308,8 @@ class ClosedLoop:
         before = crafts[0]
         for event, last, law_gains, craft, nominal in zip(events, lasts, gains, crafts, crafts[len(events) :], strict=False):
             if last > event.step:
-                setup = replace(self, parts=event.parts).setup()
-                phases.append(Phase(event.step, last, law_gains, nominal, craft, setup, before))
+                loop = self if event.parts is self.parts else replace(self, parts=event.parts)
+                phases.append(Phase(event.step, last, law_gains, nominal, craft, loop.setup(), before))
                 before = craft
         return phases
 

@@ -68,7 +68,9 @@ def _form(value: Any, known: dict[str, int]) -> Any:
     if isinstance(value, tuple):
         shared = _in_common(value)  # pyright: ignore
         equal = () if shared is None else (known.setdefault(shared, len(known)),)
-        return (type(value), *equal, *(_form(part, known) for part in value))  # pyright: ignore
+        # Most parts are numbers: a call for each would cost more than all else.
+        parts = ["number" if type(part) is float else _form(part, known) for part in value]  # pyright: ignore
+        return (type(value), *equal, *parts)  # pyright: ignore
     if isinstance(value, Buffer):
         return ("buffer", value.size)
     if isinstance(value, np.ndarray):
@@ -155,6 +157,8 @@ def state_of(numbers: Any, like: Any) -> Any:
     count = len(flatten(like))
     rest = iter(values[count:])
     state = unflatten(values[:count], like)
+    if len(values) == count:
+        return state
     return mapped(state, lambda leaf: Buffer([next(rest) for _ in range(leaf.size)]) if isinstance(leaf, Buffer) else leaf)
 
 

@@ -22,7 +22,7 @@ from starhold.errors import InputError
 from starhold.kernel.loops import WHEELS, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
-from starhold.kernel.theorems.detumbling import highest, power_at, slope, value
+from starhold.kernel.theorems.detumbling import highest, power_at, value
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.magnetorquers import LIMITED
@@ -139,8 +139,7 @@ def level_at(wired: AttitudeLoop, rate: Fraction) -> dict[str, Fraction]:
         return {}
     least = rounded(root * MORE, 9)
     often = min(2 * least, (least + rate) / 2)
-    falls = [-value(power.free, often), value(power.limited, often) / value(power.seen, often)]
-    fall = min(*falls, slope(power.limited, often) / slope(power.seen, 0))
+    fall = min(-value(power.free, often), value(power.limited, often) / value(power.seen, often))
     rise = max(highest(power.free), value(power.others, least))
     return {"rate": rate, "above": least, "often": often, "fall": near(fall, 1.0 / MORE), "rise": near(rise, MORE)}
 

@@ -184,7 +184,9 @@ def points(claim: Claim) -> Proof:
     assumed += loop.untold + ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
-    said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
+    # A torque that lags is between what is asked for and what acts at first.
+    within_too = ", if the torque that acts at first is within that too" * bool(motion.inexact and WITHIN not in numbers)
+    said = "".join(f"; {part}" for part in (enumerated(start), limited.text and limited.text + within_too) if part)
     return Statement(text + said, tuple(dict.fromkeys(assumed)), "pointing", within=tuple(within))
 
 
