@@ -105,8 +105,8 @@ def factored(p: Poly) -> Factored:
 
 def least_form(parts: Factored, region: Region) -> Rows:
     """Return the matrix of a quadratic form that bounds a polynomial from below: the cofactor of x_i x_k lies in an
-    interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with any r > 0: where the form is that of x_i^2 / r_i^2
-    on its diagonal, or the sizes."""
+    interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with any r > 0, here those in which the diagonal is 1,
+    or the sizes."""
     sizes, middle, radius = region.sizes, scalar(0, 6), scalar(0, 6)
     for (i, k), (more, less, uneven) in parts.items():
         if region.least < 0:
@@ -119,8 +119,8 @@ def least_form(parts: Factored, region: Region) -> Rows:
         for a, b in ((i, k), (k, i)):
             middle[a][b] += (above - below) / 4
             radius[a][b] += (above + below) / 4
-    least = min(middle[i][i] for i in range(6))
-    units = [1 / root(middle[i][i]) for i in range(6)] if least > 0 else [sizes[name] for name in STATE]
+    given = [middle[i][i] for i in range(6)]
+    units = [1 / root(x) for x in given] if min(given) > 0 else [sizes[name] for name in STATE]
     for i, row in enumerate(radius):
         middle[i][i] -= up(reach([row], units)[0] / units[i])
     return middle

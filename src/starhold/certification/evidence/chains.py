@@ -129,10 +129,10 @@ class Chain:
         """Return how V decreases from a level."""
         key = c, self.motion.late
         if key not in self.tried:
-            self.tried[key] = self.found(c)
+            self.tried[key] = self.sought(c)
         return self.tried[key]
 
-    def found(self, c: Fraction) -> Falls:
+    def sought(self, c: Fraction) -> Falls:
         """Find what `falls` returns."""
         motion = self.motion
         try:
@@ -235,8 +235,8 @@ class Chain:
         """Find how often a response brings motions nearer, and return the ultimate bounds."""
         motion = self.motion
         (begun, pulled), samples = first_of(motion, tube), self.samples
-        found = [(samples, ends(self.motion, tube, tube.region.X))]
-        while evidence is not None and response is not None and len(found) <= ROUNDS:
+        after = [(samples, ends(self.motion, tube, tube.region.X))]
+        while evidence is not None and response is not None and len(after) <= ROUNDS:
             try:
                 within, more = forgotten(motion, tube)
                 begun, pulled, tube = response.after(motion, within, begun, pulled)
@@ -244,12 +244,12 @@ class Chain:
             except RefusedError:
                 break
             end = ends(self.motion, tube, balls(begun), motion.away)
-            if not end[0] < found[-1][1][0] * 0.999:
+            if not end[0] < after[-1][1][0] * 0.999:
                 break
             samples += response.count + more
-            found.append((samples, end))
+            after.append((samples, end))
         # As often as is worth the time.
-        rounds = next(k for k, (_, end) in enumerate(found) if end[0] <= found[-1][1][0] * WORTH)
-        self.samples, end = found[rounds]
+        rounds = next(k for k, (_, end) in enumerate(after) if end[0] <= after[-1][1][0] * WORTH)
+        self.samples, end = after[rounds]
         self.response = {"response": (evidence or {}) | {"rounds": rounds}} if rounds else {}
         return end
