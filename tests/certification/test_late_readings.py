@@ -116,7 +116,7 @@ def test_a_smaller_set_counts_once_what_the_body_did_before_is_forgotten(monkeyp
     # The bounds of parts are of a body that turns by less than 2 rad in a period, with its target.
     for rate, turns in ((7.5, False), (8.5, True)):
         motion = held(error_attitude_per_rate=2.0**-40)
-        motion.others |= dict.fromkeys(("r1", "r2", "r3"), Fraction(rate))
+        motion.extents["r"] = Fraction(rate)
         with pytest.raises(RefusedError, match="turns too far") if turns else nullcontext():
             motion.tube(motion.region(motion.s / 2**20))
     motion = held(error_rate_per_acceleration=1e3)
