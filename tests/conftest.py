@@ -17,7 +17,7 @@ from starhold.kernel.numbers import Account
 from starhold.loop import kernels
 from starhold.trace import calling, machine
 from tests.proofs import share
-from tests.tiers import WHOLE, fewer
+from tests.tiers import SEED, WHOLE, fewer
 
 # Where modules are not to be kept once compiled, each process that a test starts would compile all of starhold anew.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -69,6 +69,16 @@ def pytest_configure(config):
     # Of workers the one process that starts them counts.
     if not hasattr(config, "workerinput") and getattr(config, "cache", None) is not None:
         config.pluginmanager.register(Stopwatch(config.cache))
+
+
+def pytest_report_header():
+    return f"drawn by STARHOLD_SEED={SEED}"
+
+
+def pytest_terminal_summary(terminalreporter):
+    # A quiet run has no header.
+    if terminalreporter.stats.get("failed"):
+        terminalreporter.write_line(f"What is drawn is drawn again by STARHOLD_SEED={SEED}.")
 
 
 def pytest_collection_finish():

@@ -81,11 +81,11 @@ def test_readme_is_a_first_screen(run):
 
 MEASURED = {
     "starhold certify cubesat-nadir --law wheel": (
-        "on an orbit within 0.391 % of a two-body one, within 0.1873° of the target after 595.3 s at all times",
-        "from up to 45° at up to 2°/s",
-        "all 13 parts of the loop are in it",
+        r"on an orbit within [\d.]+ % of a two-body one, within [\d.]+° of the target after [\d.]+ s at all times",
+        r"from up to [\d.]+° at up to [\d.]+°/s",
+        r"all \d+ parts of the loop are in it",
     ),
-    "starhold verify cubesat-mission": ("0.027819 deg",),
+    "starhold verify cubesat-mission": (r"[\d.]+ deg\b",),
 }
 """What README says of the output of its commands."""
 
@@ -93,10 +93,10 @@ MEASURED = {
 @pytest.mark.slow
 @pytest.mark.parametrize("line", MEASURED)
 def test_numbers_of_the_readme_are_measured_by_its_commands(line, tmp_path):
-    assert f"`{line}`" in read("README.md")
-    printed = starhold(*line.split()[1:], cwd=tmp_path, code=0).stdout
-    for text in (read("README.md"), printed):
-        assert [number for number in MEASURED[line] if number not in " ".join(text.lower().split())] == []
+    (told,) = (" ".join(item.split()) for item in read("README.md").split("\n* ") if f"`{line}`" in item)
+    printed = " ".join(starhold(*line.split()[1:], cwd=tmp_path, code=0).stdout.split())
+    for pattern in MEASURED[line]:
+        assert re.search(pattern, told)[0].lower() in printed.lower()
 
 
 def test_version_is_said_alike():

@@ -43,10 +43,10 @@ def certify(name: str, folder: Path) -> list[Path]:
     return write_lemmas(folder)
 
 
-def refusal(path: Path) -> tuple[str, float, float]:
+def refusal(path: Path, *options: str) -> tuple[str, float, float]:
     """Return what coqc says of a file, nothing where it accepts all of it, and the processor's seconds and MiB it takes."""
     with tempfile.TemporaryFile("w+") as said:
-        started = subprocess.Popen(["coqc", path.name], cwd=path.parent, stdout=said, stderr=said)
+        started = subprocess.Popen(["coqc", *options, path.name], cwd=path.parent, stdout=said, stderr=said)
         _, status, used = os.wait4(started.pid, 0)
         started.returncode = os.waitstatus_to_exitcode(status)
         said.seek(0)

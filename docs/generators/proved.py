@@ -9,6 +9,7 @@ import json
 import math
 import sys
 import warnings
+from collections.abc import Collection
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from starhold.certification.certificate import Claim
 from starhold.scenario.building import build
 from starhold.studies.bodies.rigid_body import STUDY
 from starhold.studies.budget import COMBINED, LOOP, TOGETHER, faultless, sources, study, without
-from starhold.studies.pointing import prove_pointing
+from starhold.studies.pointing import ProvedPointing, prove_pointing
 
 STORED = Path(__file__).with_name("proved.json")
 """By scenario and certificate what is proved: the start (rad, rad/s), the ultimate bounds (rad, rad/s), from when on (s), in
@@ -87,15 +88,21 @@ def worst(claim: Claim) -> dict[str, Any]:
 
 def proved(name: str, law: str) -> dict[str, Any] | None:
     """What each source costs now in a law's bound, and what is measured of it; None where no bound is proved."""
+    proof = costs(name, law)
+    if proof.angle is None:
+        return None
+    return {"shares": dict(proof.shares), "measured": measured(name, law, proof.settling or 0.0)}
+
+
+def costs(name: str, law: str, only: Collection[str] = ()) -> ProvedPointing:
+    """What is proved now of a law without faults, and what each source costs in it, or only those that are named."""
     scenario = sh.load(name)
     entry, flown = scenario.pick(law), faultless(scenario)
     every = sources(flown)
     others = {one.name: partial(without, flown, entry, [one]) for one in every}
     others |= {REST: partial(without, flown, entry, every)} if every else {}
-    proof = prove_pointing(flown, without(flown, entry, []), others)
-    if proof.angle is None:
-        return None
-    return {"shares": dict(proof.shares), "measured": measured(name, law, proof.settling or 0.0)}
+    others = {source: made for source, made in others.items() if not only or source in only}
+    return prove_pointing(flown, without(flown, entry, []), others)
 
 
 def measured(name: str, law: str, settling: float) -> dict[str, float]:

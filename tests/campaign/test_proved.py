@@ -24,6 +24,7 @@ from starhold.studies.body import study_of
 from starhold.studies.compare import record
 from tests.campaign.flown import fly, normal, short, uniform
 from tests.running import starhold
+from tests.tiers import drawn
 
 NOISY = {"rate_noise": 1e-5, "attitude_noise": 1e-5}
 ANYWHERE = {"initial.attitude": {"distribution": "rotations"}, "initial.rate": {"distribution": "shell", "high": "8 deg/s"}}
@@ -229,7 +230,7 @@ ATTACKED = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ATTACKED)
+@pytest.mark.parametrize("name", drawn(ATTACKED, 2))
 def test_no_more_flights_than_the_share_are_beyond_what_is_proved(name):
     """From inside and outside of the claims' sets, before faults and after."""
     (scenario, law), (over, changes, runs) = name.split(), ATTACKED[name]

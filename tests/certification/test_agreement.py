@@ -17,7 +17,7 @@ from starhold.parts.craft import make_craft
 from tests.certification.edits import checked
 from tests.certification.hunt import contradicted, fault_in, random_scenario
 from tests.certification.loops import energy, free, loop_of, rotors
-from tests.tiers import leading
+from tests.tiers import drawn, leading, seeds
 
 FOUND = (12, 15, 30, 90, 58, 66, 91, 98, 118, 2489, 3239, 22, 71, 111, 196, 2102)
 """Seeds of scenarios that certifier, checker or flights once did not agree on, last those that take long."""
@@ -30,11 +30,10 @@ def test_hunted_scenarios(seed, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", [1000, 1025])
-def test_many_random_scenarios(first, tmp_path):
-    for seed in range(first, first + 15):
+def test_many_random_scenarios(tmp_path):
+    for seed in seeds(15):
         text = random_scenario(np.random.default_rng(seed), tmp_path)
-        assert fault_in(text, tmp_path) == "", text
+        assert fault_in(text, tmp_path) == "", seed
 
 
 def test_a_law_that_clips_its_torque_is_certified(tmp_path):
@@ -44,9 +43,8 @@ def test_a_law_that_clips_its_torque_is_certified(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(0, 80, 40))
-def test_no_flight_contradicts_what_is_proved_of_flights_like_it(first, tmp_path):
-    for seed in range(first, first + 20):
+def test_no_flight_contradicts_what_is_proved_of_flights_like_it(tmp_path):
+    for seed in seeds(20):
         random = np.random.default_rng(seed)
         text = random_scenario(random, tmp_path)
         assert contradicted(text, random, tmp_path) == "", seed
@@ -87,7 +85,7 @@ def test_a_law_may_cancel_a_part_of_the_modelled_torque(compensation, wheels, tm
 
 @pytest.mark.parametrize(
     ("law", "slew_angle"),
-    leading([(law, angle) for angle in (1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0) for law in ("pd", "wheel")]),
+    drawn([(law, angle) for angle in (1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0) for law in ("pd", "wheel")], 5),
 )
 def test_the_set_of_a_turn_holds_it(law, slew_angle, tmp_path):
     gains = {"pd": pd.Gains(0.09, 0.009), "wheel": wheel.Gains(0.09, (0.0045,) * 3)}[law]
@@ -103,16 +101,16 @@ def test_the_set_of_a_turn_holds_it(law, slew_angle, tmp_path):
 THIN = ([1e-14, 1.0, 1.0], [1e-20, 1.0, 1.0], [1e-14, 1e-14, 1e-14], [1e3, 1e3, 1e-12])
 
 
-@pytest.mark.parametrize(
-    ("law", "number", "moments"),
-    [
-        # Two bodies with the first gains of one law; what is left is slow.
-        pytest.param(law, number, moments, marks=pytest.mark.slow if number or place != turn or turn < 2 else ())
-        for turn, law in enumerate(("lqr", "modal", "wheel", "sliding", "pd", "lyapunov"))
-        for number in range(1 if law == "modal" else len(catalogue()[law].examples()))
-        for place, moments in enumerate(THIN)
-    ],
-)
+def thin():
+    """Laws with their gains and bodies: two that say most, then every other."""
+    laws = ("lqr", "modal", "wheel", "sliding", "pd", "lyapunov")
+    of = {law: range(1 if law == "modal" else len(catalogue()[law].examples())) for law in laws}
+    every = [(law, number, moments) for law in laws for number in of[law] for moments in THIN]
+    first = [("wheel", 0, THIN[2]), ("sliding", 0, THIN[3])]
+    return drawn([*first, *(one for one in every if one not in first)], 12, len(first))
+
+
+@pytest.mark.parametrize(("law", "number", "moments"), thin())
 def test_thin_bodies_have_certificates(law, number, moments, tmp_path):
     gains = catalogue()[law].examples()[number]
     certificate = certify(free(loop_of(law, gains, make_craft(moments, torque_limit=0.05))), law, Wanted(disturbance=1e-6))

@@ -10,7 +10,7 @@ from starhold.certification.invariant.search import Candidate
 from starhold.checker import check_file, passed
 from tests.certification.invariants import ORIGIN as AT_ORIGIN
 from tests.certification.invariants import SQUARE, claim, expression, file, fractions, system
-from tests.tiers import leading
+from tests.tiers import drawn, leading
 
 ORIGIN, ROUND = (0, 0), "x**2 + y**2"
 ON = (
@@ -36,12 +36,8 @@ def written(folder, x="-x", y="-y", V=ROUND, theorem="region", equilibrium=AT_OR
 
 @pytest.mark.parametrize(
     ("on", "surface"),
-    [
-        # Each text on one surface; the other pairs are slow.
-        pytest.param(on, surface, marks=() if k % 3 == place else pytest.mark.slow)
-        for k, on in enumerate(ON)
-        for place, surface in enumerate(("x", "x - y", "y - x**2"))
-    ],
+    # Each text on one surface, and others.
+    drawn([(on, ("x", "x - y", "y - x**2")[(k + more) % 3]) for more in range(3) for k, on in enumerate(ON)], 6, len(ON)),
 )
 def test_a_function_that_is_another_on_a_surface_is_not_continuous(on, surface, tmp_path):
     V = f"{ROUND} - 5*{on.format(surface)}"
@@ -154,7 +150,7 @@ def on_lines(random):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", leading([1, 2, 4, 6, 0, 3, 5, *range(7, 14), 15, 16, *range(18, 24)], 2))
+@pytest.mark.parametrize("seed", drawn([1, 2, 4, 6, 0, 3, 5, *range(7, 14), 15, 16, *range(18, 24)], 8, 2))
 def test_what_is_proved_holds_on_surfaces_too(seed, tmp_path):
     """By exact values of the texts, and by motions that keep to a line while the rates there point along it."""
     random = np.random.default_rng(seed)

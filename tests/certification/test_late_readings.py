@@ -24,71 +24,12 @@ from starhold.kernel.theorems import pointing
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import Noise
 from starhold.parts.estimators import complementary_filter
-from starhold.scenario.building import build
-from starhold.scenario.reading import parse
-from starhold.studies.bodies.rigid_body import certified_loops, wanted_of
+from starhold.studies.bodies.rigid_body import wanted_of
 from tests.certification.attack import Attack, flown
 from tests.certification.extremal import Steered
+from tests.certification.own_spacecraft import PARTS, loop_with
 from tests.kernel.flights import along, seen, turned_on
 from tests.tiers import leading
-
-OWN = """
-name = "own"
-[spacecraft]
-inertia = [1.0, 1.2, 0.8]
-[initial]
-angles = ["20 deg", "-10 deg", "5 deg"]
-[target]
-mode = "inertial"
-[simulation]
-duration = 200.0
-control_period = 0.25
-[certify]
-disturbance = "1e-5 N m"
-[[law]]
-type = "lyapunov"
-form = "bandwidth"
-bandwidth = 0.1
-damping = 0.9
-"""
-LATE = """
-[[part]]
-type = "star-tracker"
-cross = 0.0
-roll = 0.0
-delay = 0.6
-interval = 0.5
-[[part]]
-type = "gyro"
-delay = "0.1 s"
-scale_error = 0.001
-"""
-FILTERED = """
-[[part]]
-type = "star-tracker"
-cross = "10 arcsec"
-roll = "60 arcsec"
-interval = 0.5
-delay = 0.2
-[[part]]
-type = "gyro"
-noise = 2e-5
-bias = ["0.02 deg/s", "-0.01 deg/s", "0.015 deg/s"]
-bias_walk = 1e-5
-[[part]]
-type = "complementary-filter"
-attitude_gain = 0.2
-bias_gain = 0.01
-"""
-PARTS = {"late": LATE, "filtered": FILTERED}
-
-
-@cache
-def loop_with(parts):
-    scenario = parse(OWN + PARTS[parts], "own.toml", None)
-    entry = scenario.laws[0]
-    (loop,) = certified_loops(scenario, entry, build(scenario, entry)).values()
-    return scenario, loop
 
 
 @cache
@@ -175,7 +116,7 @@ def test_a_smaller_set_counts_once_what_the_body_did_before_is_forgotten(monkeyp
     # The bounds of parts are of a body that turns by less than 2 rad in a period, with its target.
     for rate, turns in ((7.5, False), (8.5, True)):
         motion = held(error_attitude_per_rate=2.0**-40)
-        motion.others |= dict.fromkeys(("r1", "r2", "r3"), Fraction(rate))
+        motion.extents["r"] = Fraction(rate)
         with pytest.raises(RefusedError, match="turns too far") if turns else nullcontext():
             motion.tube(motion.region(motion.s / 2**20))
     motion = held(error_rate_per_acceleration=1e3)

@@ -5,7 +5,7 @@ import pytest
 
 from tests.certification.attack import flown
 from tests.certification.pointing_hunt import hunted, proved_loop
-from tests.tiers import leading
+from tests.tiers import drawn, leading, seeds
 
 PROVED = [2002, 2001, 2000, 2004, 2005, 2007, 2009, 2028, 2029, 2030, 2031]
 """Seeds of loops of which a bound is proved: with and without wheels, noise, orbits, limits."""
@@ -22,9 +22,14 @@ def test_no_flight_breaks_the_pointing_claim_of_a_random_loop(seed, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(3000, 3060, 20))
-def test_no_random_loop_is_proved_what_it_does_not_keep(first, tmp_path):
-    assert [seed for seed in range(first, first + 20) if hunted(seed, tmp_path)[2]] == []
+def test_no_random_loop_is_proved_what_it_does_not_keep(tmp_path):
+    assert [seed for seed in seeds(15) if hunted(seed, tmp_path)[2]] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", drawn(["every", "delayed", "late", "integral", "lost", "shaken", "targets", "plans"], 2, 0))
+def test_no_random_loop_of_a_kind_is_proved_what_it_does_not_keep(kind, tmp_path):
+    assert [seed for seed in seeds(3) if hunted(seed, tmp_path, kind=kind)[2]] == []
 
 
 @pytest.mark.slow

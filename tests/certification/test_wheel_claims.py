@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ from starhold.studies.bodies.rigid_body import certify_law
 from tests import making
 from tests.certification.loops import FULL, free, loop_of, rotors
 from tests.making import ORBITAL, aimed, on_wheels
-from tests.tiers import fewer, leading
+from tests.tiers import drawn, fewer, leading
 
 EVEN = wheel.Gains(0.3, (0.015, 0.015, 0.015))
 UNEVEN = wheel.Gains(0.3, (0.01, 0.015, 0.025))
@@ -96,16 +97,14 @@ def test_every_half_turn_where_weights_are_equal(k, axis):
     assert unstable(wheel.Gains(0.3, (k, k, k)), FULL, np.array(axis) / length) == (1, 2)
 
 
-@pytest.mark.parametrize(
-    ("gains", "sign_policy", "target"),
-    [
-        # Both gains and targets, once each; the others are slow.
-        pytest.param(gains, policy, target, marks=() if (k, number, j) in ((0, 0, 0), (1, 1, 1)) else pytest.mark.slow)
-        for k, policy in enumerate(("as_published", "shortest", "hysteresis"))
-        for number, gains in enumerate((EVEN, UNEVEN))
-        for j, target in enumerate((ORBITAL, aimed((1.0, 0.0, 0.0, 0.0))))
-    ],
-)
+def stored():
+    """Gains, policies and targets: both gains and targets once each, then the others."""
+    cases = sorted(product(range(2), range(3), range(2)), key=lambda case: case not in ((0, 0, 0), (1, 1, 1)))
+    policies, targets = ("as_published", "shortest", "hysteresis"), (ORBITAL, aimed((1.0, 0.0, 0.0, 0.0)))
+    return [((EVEN, UNEVEN)[i], policies[k], targets[j]) for i, k, j in cases]
+
+
+@pytest.mark.parametrize(("gains", "sign_policy", "target"), drawn(stored(), 3, 2))
 def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, sign_policy, target):
     loop = rotors("wheel", gains, target, sign_policy=sign_policy)
     certificate = certify(loop)

@@ -19,6 +19,7 @@ from starhold.kernel.numbers import RefusedError
 from starhold.kernel.programs import digest
 from starhold.scenario.building import build
 from tests.making import built
+from tests.proofs import shared
 
 CRAFT = {"inertia": [2.0, 3.0, 4.0], "torque_limit": "0.01 N m", "limit": "norm"}
 QUIET = {"spacecraft": CRAFT, "simulation": {"duration": "1 min", "control_period": 0.1}}
@@ -81,6 +82,7 @@ def radii_of(loop):
 
 
 @cache
+@shared
 def flying(name):
     """What was found about a loop with a held torque, errors and torques from outside."""
     (inertia, k_rate, k_attitude, period), told = POINTING[name]
@@ -93,6 +95,7 @@ def flying(name):
 
 
 @cache
+@shared
 def found(scenario, law):
     """What was found about a law of a built-in scenario, of one by hand, of one with its torque held, or of one that takes
     over."""

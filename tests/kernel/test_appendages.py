@@ -4,7 +4,6 @@ import copy
 import json
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
 
 import numpy as np
 import pytest
@@ -13,30 +12,24 @@ from scipy.linalg import expm
 
 from starhold.analysis.departure import departures, start_inside
 from starhold.certification.appendages import appended_motion
-from starhold.certification.certify import Wanted, certify
 from starhold.certification.evidence import appendages
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.subject import make_subject
 from starhold.kernel import appended
 from starhold.kernel.check import check
-from starhold.kernel.numbers import Account, RefusedError, rational
+from starhold.kernel.numbers import WORK, Account, RefusedError, rational
 from starhold.kernel.programs import Program, digest
-from starhold.kernel.taylor import ONE, run, within
+from starhold.kernel.taylor import BITS, ONE, run, within
 from starhold.kernel.theorems.response import Response
 from starhold.simulation.lane import fly, label
 from tests.kernel.certificates import failing
 from tests.kernel.flights import turned_on
 from tests.kernel.oracle import number
 from tests.kernel.programs import run as run_in_floats
-from tests.kernel.swaying import MODES, MOMENTS, Swaying, content_of, found, loop_of
+from tests.kernel.swaying import MODES, MOMENTS, Swaying, content_of, found, issued_of, loop_of
 from tests.tiers import leading
 
 MOST = 1.0 + 1e-6
-
-
-@cache
-def issued_of(name):
-    return certify(loop_of(name), "", Wanted(pointing=True))
 
 
 def proved(content):
@@ -66,6 +59,7 @@ def shares(content, seconds=20.0, seed=1, lanes=32):
 def test_no_flight_exceeds_a_bound(name):
     content = content_of(name)
     statement = proved(content).statement
+    assert WORK - Account.left < WORK / 3
     assert statement.label == "appendages"
     assert "unlimited-torque" not in statement.assumptions
     reached = shares(content)
@@ -415,7 +409,7 @@ def test_models_hold_what_programs_do():
         x = random.choice([-1.0, 1.0], 10) * random.uniform(size=10) ** random.choice([0.05, 1.0])
         values = run_in_floats(program, {name: y * float(sizes[name]) for name, y in zip(names, x, strict=True)})
         for model, value in zip(models, values, strict=True):
-            terms = [(m, c) for part in model.parts for m, c in part.items()]
+            terms = [(m >> BITS, c) for m, c in model.terms.items()]
             powers = [c / ONE * np.prod([x[k] ** (m >> 4 * k & 15) for k in range(10)]) for m, c in terms]
             assert abs(value - sum(powers)) <= model.radius / ONE + 1e-13
     # Past an eighth of a turn the program has no value, and the kernel refuses the box.

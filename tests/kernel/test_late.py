@@ -22,7 +22,7 @@ from starhold.kernel.check import check
 from starhold.kernel.follower import FIRST, REST
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
-from starhold.kernel.numbers import Account, RefusedError
+from starhold.kernel.numbers import WORK, Account, RefusedError
 from starhold.kernel.theorems.pointing import forgotten, on_level
 from starhold.parts.catalogue import fit
 from starhold.scenario.building import build
@@ -65,6 +65,12 @@ def test_an_actuator_that_lags_is_in_the_claim_and_no_flight_breaks_it(late):
     found, shares = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, 3).worst()
     assert found == ""
     assert max(shares) > 0.1
+
+
+def test_a_check_with_a_lag_takes_little_of_the_work_that_it_may():
+    _, claim, _ = flying("lag", 0.05)
+    assert check(edited(claim))
+    assert WORK - Account.left < WORK / 5
 
 
 @pytest.mark.slow

@@ -13,8 +13,8 @@ from starhold.certification.evidence.claims import floats
 from starhold.kernel.follower import FIRST, REST, Change, Costs, Follower, Late
 from starhold.kernel.regions import RATE
 from tests.kernel.flights import along, moved, turned_on
-from tests.kernel.test_dropped_terms import LANES, Flight, quiet
-from tests.kernel.test_late_doubts import AXES, BALL, Lagging
+from tests.kernel.lagging import AXES, BALL, Lagging
+from tests.kernel.periods import LANES, Flight, quiet
 
 SHARP, SMALL = [1.0, 1e-4, 1e-4], 1e-6
 ALONE = {

@@ -4,6 +4,7 @@ import re
 import shutil
 from dataclasses import replace
 from fractions import Fraction
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -22,12 +23,39 @@ LIBRARY = {"ClassicalDedekindReals.sig_forall_dec", "FunctionalExtensionality.fu
 """What Rocq's own library takes for granted of the real numbers."""
 
 
-def refusal(lemmas, folder, seconds=SECONDS):
-    """What coqc says against a file; nothing where it accepts all of it."""
+RULES = resources.files("starhold.certification").joinpath("rocq.v").read_text(encoding="utf-8")
+PROVED = "From Coq Require Import Reals ZArith List.\nRequire Import rules.\nImport ListNotations.\nOpen Scope R_scope.\n"
+"""What stands in place of the rules where they are proved already."""
+LEMMA = re.compile(r"^(?:Definition (claim\w+)_evidence := .*\n)?Lemma (claim\w+) :(?:.*\n)*?Qed\.\n", re.MULTILINE)
+
+
+@pytest.fixture(scope="module")
+def rules(tmp_path_factory):
+    """The folder with the rules, which coqc has accepted."""
     if shutil.which("coqc") is None:
         pytest.skip("coqc, the compiler of Rocq, is not installed here")
+    folder = tmp_path_factory.mktemp("rules")
+    (folder / "rules.v").write_text(RULES)
+    assert documented.refusal(folder / "rules.v")[0] == ""
+    return folder
+
+
+def refusal(lemmas, folder, rules=None, seconds=SECONDS):
+    """What coqc says against a file, of which the rules may be proved already; nothing where it accepts all of it."""
+    assert lemmas.startswith(RULES)
+    if rules is not None:
+        lemmas = PROVED + lemmas.removeprefix(RULES)
     (folder / "lemmas.v").write_text(f"Set Default Timeout {seconds}.\n{lemmas}")
-    return documented.refusal(folder / "lemmas.v")[0]
+    return documented.refusal(folder / "lemmas.v", *(() if rules is None else ("-Q", str(rules), "")))[0]
+
+
+def lemmas_of(text):
+    """The lemmas of a file by their names, each under the name that none has; nothing but the rules stands beside them."""
+    beside = LEMMA.sub("", text.removeprefix(RULES))
+    assert re.fullmatch(r"(\n|\(\* [^()*\"]* \*\)\n|Definition v(\d+) := v \2\.\n)*", beside)
+    found = {match[2]: match[0] for match in LEMMA.finditer(text)}
+    assert len(found) == text.count(documented.COUNTED)
+    return {name: re.sub(rf"\b{name}(_evidence)?\b", r"claim\1", lemma) for name, lemma in found.items()}
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +87,8 @@ def test_short_squares_leave_little_of_a_positive_matrix_and_none_are_of_another
 
 @pytest.mark.slow
 def test_rocq_accepts_a_small_certificate_from_the_axioms_of_its_library_alone(small, tmp_path):
+    if shutil.which("coqc") is None:
+        pytest.skip("coqc, the compiler of Rocq, is not installed here")
     _, lemmas = small
     every = ", ".join(re.findall(r"^Lemma (claim\w+)", lemmas, re.MULTILINE))
     said = refusal(f"{lemmas}\nDefinition every := ({every}).\nPrint Assumptions every.", tmp_path)
@@ -118,30 +148,26 @@ FALSE = {
 
 
 @pytest.mark.slow
-def test_rocq_accepts_each_kind_of_obligation_as_the_kernel_does(small, tmp_path):
-    files = []
-    for name, (rule, evidence) in SMALL.items():
+def test_rocq_accepts_each_kind_of_obligation_as_the_kernel_does(small, rules, tmp_path):
+    for rule, evidence in SMALL.values():
         rule.check(evidence)
-        files.append(with_rule(small, rule, evidence))
-        (tmp_path / name).mkdir()
-    for name, lemmas in zip(SMALL, files, strict=True):
-        assert refusal(lemmas, tmp_path / name) == "", name
+        assert refusal(with_rule(small, rule, evidence), tmp_path, rules) == ""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FALSE)
-def test_rocq_refuses_what_the_kernel_did_not_decide(name, small, tmp_path):
+def test_rocq_refuses_what_the_kernel_did_not_decide(name, small, rules, tmp_path):
     """What is said, or its evidence, is changed to what is false."""
     of, given, other = FALSE[name]
     lemmas = with_rule(small, *SMALL[of])
     place = lemmas.index("(* step *)")
     changed, count = re.subn(given, other, lemmas[place:])
     assert count == 1, lemmas[place:]
-    assert "lemmas.v" in refusal(lemmas[:place] + changed, tmp_path)
+    assert "lemmas.v" in refusal(lemmas[:place] + changed, tmp_path, rules)
 
 
 @pytest.mark.slow
-def test_rocq_refuses_a_changed_certificate_and_evidence_that_does_not_show_it(small, tmp_path):
+def test_rocq_refuses_a_changed_certificate_and_evidence_that_does_not_show_it(small, rules, tmp_path):
     """The statement is changed to what is false, alone and with its evidence alike."""
     _, lemmas = small
     place = lemmas.index("(* V is non-increasing *)")
@@ -150,7 +176,7 @@ def test_rocq_refuses_a_changed_certificate_and_evidence_that_does_not_show_it(s
     number = re.search(r"<= num (\w+)", lemmas[said:end])[1]
     for first in (place, said):
         other = lemmas[:first] + re.sub(rf"\b{number}\b", f"(-{number})", lemmas[first:end]) + lemmas[end:]
-        assert "lemmas.v" in refusal(other, tmp_path)
+        assert "lemmas.v" in refusal(other, tmp_path, rules)
 
 
 def test_the_table_has_every_example():
@@ -158,12 +184,22 @@ def test_the_table_has_every_example():
     assert [*stored] == documented.names()
 
 
+@pytest.fixture(scope="module")
+def accepted():
+    """The lemmas that coqc has accepted of the examples before."""
+    return set()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", documented.names())
-def test_rocq_accepts_all_that_is_proved_of_an_example(name, tmp_path):
+def test_rocq_accepts_all_that_is_proved_of_an_example(name, accepted, rules, tmp_path):
     """Of every law, mode and hand-over, and after faults: the files of the table in the documentation, and no other."""
-    if shutil.which("coqc") is None:
-        pytest.skip("coqc, the compiler of Rocq, is not installed here")
-    found = documented.accepted(tmp_path, documented.certify(name, tmp_path))
+    files = {path.name: path.read_text(encoding="utf-8") for path in documented.certify(name, tmp_path)}
     stored = documented.json.loads(documented.STORED.read_text())[name]
-    assert {file: of["lemmas"] for file, of in found.items()} == {file: of["lemmas"] for file, of in stored.items()}
+    lemmas = {file: lemmas_of(text) for file, text in files.items()}
+    new = {lemma for found in lemmas.values() for lemma in found.values()} - accepted
+    places = sorted({int(k) for lemma in new for k in re.findall(r"\bv(\d+) ", lemma)})
+    named = (re.sub(r"\bclaim(_evidence)?\b", rf"claim{k}\1", lemma) for k, lemma in enumerate(sorted(new)))
+    assert refusal("\n".join([RULES, *(f"Definition v{k} := v {k}." for k in places), *named]), tmp_path, rules) == ""
+    accepted |= new
+    assert {file: len(found) for file, found in lemmas.items()} == {file: of["lemmas"] for file, of in stored.items()}

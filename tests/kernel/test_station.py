@@ -2,7 +2,6 @@
 
 import copy
 import json
-import random
 import time
 
 import pytest
@@ -15,7 +14,7 @@ from starhold.kernel.programs import digest
 from tests.kernel.certificates import failing, rekeyed, text
 from tests.kernel.mutations import refusals
 from tests.kernel.stations import BEST, REST, SOFT, StationOracle, certify_station, flown, loop_of, proof
-from tests.tiers import WHOLE, leading
+from tests.tiers import WHOLE, leading, source
 
 ROUND = {"level": 0.49999952, "outer": 1.4142133, "velocity": 0.9999995}
 WITHIN = {
@@ -43,7 +42,7 @@ MADE = {
     "x leaves": lambda: certify_station(loop_of(BEST._replace(k_x=8.0))),
 }
 PLACES = {"limit": 1, "limit by axis": 1, "deficit": 1, "limited axis": 1}
-COUNT = 400 if WHOLE else 60
+COUNT = 100 if WHOLE else 60
 
 
 def made(name):
@@ -78,7 +77,7 @@ def test_nothing_false_is_accepted(name):
     def true(content, claim):
         return StationOracle(content, claim).holds()
 
-    assert refusals(made(name), random.Random(name), COUNT, true) > COUNT / 3
+    assert refusals(made(name), source(name), COUNT, true) > COUNT / 3
 
 
 FALSE = [

@@ -10,7 +10,7 @@ from starhold.link.process import fly_by_process
 from starhold.loop.kernels import numbers_of
 from starhold.simulation.lane import fly
 from tests.export.flown import built, code_of, loop_of, same
-from tests.tiers import fewer, leading
+from tests.tiers import drawn, fewer, leading
 
 STEPS = 400
 LOOPS = ["lyapunov", "estimator", "wheel", "sun", "l2", "sliding", "yaw-steering", "target from a table", "directions",
@@ -19,7 +19,7 @@ LOOPS = ["lyapunov", "estimator", "wheel", "sun", "l2", "sliding", "yaw-steering
          "a law that reads validity"]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", leading(LOOPS, 5))
+@pytest.mark.parametrize("name", drawn(LOOPS, 6, 5))
 def test_exported_laws_fly_the_bits_of_the_simulation(name, tmp_path):
     steps = fewer(STEPS, 2) if name != "mpc" else 12
     samples, carry = fly_by_process(built(tmp_path, code_of(name), "-O2"), loop_of(name), steps)

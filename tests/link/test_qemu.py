@@ -6,7 +6,7 @@ from starhold.link.process import fly_by_process
 from starhold.loop.kernels import numbers_of
 from starhold.simulation.lane import fly
 from tests.export.flown import built, code_of, loop_of, need, same
-from tests.tiers import fewer, leading
+from tests.tiers import drawn, fewer
 
 BOARDS = {
     "arm": ("arm-linux-gnueabihf-gcc", "-march=armv7-a", "-mfpu=vfpv4"),
@@ -19,8 +19,7 @@ LAWS = ["mission", "lyapunov", "estimator", "wheel", "mpc"]
 """The first has an estimator and modes, of which the whole goes through four."""
 
 
-@pytest.mark.parametrize("machine", leading(BOARDS))
-@pytest.mark.parametrize("name", leading(LAWS))
+@pytest.mark.parametrize(("name", "machine"), drawn([(name, machine) for machine in BOARDS for name in LAWS], 6))
 def test_a_processor_flies_the_bits_of_the_simulation(name, machine, tmp_path):
     need(f"qemu-{machine}")
     compiler, *flags = BOARDS[machine]

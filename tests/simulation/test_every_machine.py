@@ -12,7 +12,7 @@ from starhold.loop.programs import one
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 from tests.simulation.loops import builtin, choices
-from tests.tiers import fewer, leading
+from tests.tiers import drawn, fewer, of_the_day
 from tests.trace.machines import LEVELS, Job, on_c, on_node
 
 pytestmark = pytest.mark.usefixtures("optimised")
@@ -46,7 +46,7 @@ def choices_of(loop: Any) -> set[Any]:
 
 
 def siblings() -> set[str]:
-    """Loops that are made of nothing that one before lacks, those of many parts first: for `make test-all`."""
+    """Loops that are made of nothing that one before lacks, those of many parts first: some for `make test-all`."""
     seen, found = set[Any](), set[str]()
     for name in sorted(LOOPS, key=lambda name: -len(LOOPS[name].parts)):
         own = choices_of(LOOPS[name])
@@ -55,7 +55,10 @@ def siblings() -> set[str]:
     return found
 
 
-SIBLINGS = siblings()
+ALIKE = siblings()
+SIBLINGS = {*of_the_day(sorted(ALIKE), 12)}
+"""Those of the day: what is compared of the others is compared of loops that are made of the same."""
+TODAY = [name for name in LOOPS if name in SIBLINGS or name not in ALIKE]
 
 
 class Leg(NamedTuple):
@@ -91,7 +94,7 @@ def same(found: Any, expected: Any) -> None:
     assert np.array_equal(np.asarray(found).view(np.uint64), np.asarray(expected).view(np.uint64))
 
 
-FLOWN = [pytest.param(name, marks=SLOW if name in SIBLINGS else ()) for name in LOOPS]
+FLOWN = [pytest.param(name, marks=SLOW if name in SIBLINGS else ()) for name in TODAY]
 
 
 @pytest.mark.parametrize("name", FLOWN)
@@ -99,9 +102,9 @@ def test_one_lane(name):
     same(numbers_of(fly(LOOPS[name], steps_of(name), run=RUN)[1]), numbers_of(legs(name)[-1].end))
 
 
-EIGHT = [pytest.param(name, 8, marks=SLOW if name in SIBLINGS or name not in BUILTIN else ()) for name in LOOPS]
-LANES = [*EIGHT, *leading([(name, 16) for name in LOOPS if not is_costly(name)])]
-"""Loops of built-in scenarios on eight lanes and one on sixteen; by `make test-all` every loop on both."""
+EIGHT = [pytest.param(name, 8, marks=SLOW if name in SIBLINGS or name not in BUILTIN else ()) for name in TODAY]
+LANES = [*EIGHT, *drawn([(name, 16) for name in LOOPS if not is_costly(name)], 15)]
+"""Loops of built-in scenarios on eight lanes and one on sixteen; by `make test-all` those of the day on either."""
 
 
 @pytest.mark.parametrize(("name", "width"), LANES)
@@ -121,7 +124,8 @@ def test_every_lane_of_many(name, width):
 def jobs(siblings: bool) -> list[tuple[Leg, Job]]:
     """Every leg of every flight as a job of the printed program, of the siblings or of all others."""
     programs, found = dict[Any, Any](), list[tuple[Leg, Job]]()
-    for name, loop in LOOPS.items():
+    for name in TODAY:
+        loop = LOOPS[name]
         if (name in SIBLINGS) != siblings:
             continue
         for leg in legs(name):

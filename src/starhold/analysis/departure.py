@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, apply, norm, subtract
 from starhold.analysis.meter import ALMOST, on_limit
-from starhold.analysis.told_errors import misreadings
+from starhold.analysis.misreadings import misreadings
 from starhold.certification.appendages import recorded_states, start_of
 from starhold.certification.assumptions import LINEAR, assumption
 from starhold.certification.certificate import Certificate, Claim

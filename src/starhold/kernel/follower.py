@@ -314,9 +314,6 @@ def together(parts: list[tuple[Fraction, Rows]], sizes: Sequence[Fraction]) -> R
     """Return a matrix M with |Mx| >= the sum of c |Rx|, tightest where |x_i| is of these sizes: the square of the sum is at
     most the sum of (c |Rx|)^2 / s, with shares s that add up to 1."""
     weights = [c * norm(reach(R, sizes)) for c, R in parts]
-    return [
-        [c * root(sum(weights, ZERO) / weight) * x for x in row]
-        for (c, R), weight in zip(parts, weights, strict=True)
-        if weight
-        for row in R
-    ]
+    whole = sum(weights, ZERO)
+    scales = [c * root(whole / weight) if weight else ZERO for (c, _), weight in zip(parts, weights, strict=True)]
+    return [[c * x for x in row] for c, (_, R) in zip(scales, parts, strict=True) if c for row in R]

@@ -42,9 +42,9 @@ class Account:
     @classmethod
     def spend(cls, operations: int, bits: int = 64) -> None:
         """Charge for operations on numbers of so many bits before they are done."""
-        demand(bits <= LONGEST, "a number becomes too long")
         cls.left -= operations * (2 + bits // 64)
-        demand(cls.left >= 0, "the check takes too much work")
+        if bits > LONGEST or cls.left < 0:
+            raise RefusedError("a number becomes too long" if bits > LONGEST else "the check takes too much work")
 
 
 def longest(numbers: Iterable[Fraction]) -> int:
@@ -101,10 +101,10 @@ def whole(numbers: Sequence[Fraction | int]) -> tuple[list[int], int]:
     return [x.numerator * (below // x.denominator) if below > 1 else x.numerator for x in numbers], below
 
 
-def added(numbers: Sequence[Fraction]) -> Fraction:
-    """Return a sum, reduced to lowest terms once."""
-    upper, below = whole(numbers)
-    return Fraction(sum(upper), below)
+def added(numbers: Sequence[Fraction], times: Sequence[Fraction] | None = None) -> Fraction:
+    """Return a sum, of numbers or of their products with others, reduced to lowest terms once."""
+    (upper, below), (more, under) = whole(numbers), whole(times) if times else ([], 1)
+    return Fraction(sum(map(mul, upper, more)) if times else sum(upper), below * under)
 
 
 def surely_definite(a: Rows) -> bool:
@@ -230,8 +230,9 @@ def root(x: Fraction) -> Fraction:
 
 def up(x: Fraction) -> Fraction:
     """Return a short, tight upper bound of a number."""
-    Account.spend(2, longest([x]))
-    places = 64 + max(0, x.denominator.bit_length() - x.numerator.bit_length())
+    above, below = x.numerator.bit_length(), x.denominator.bit_length()
+    Account.spend(2, above + below)
+    places = 64 + max(0, below - above)
     return Fraction(-((-x.numerator << places) // x.denominator), 1 << places)
 
 

@@ -10,7 +10,7 @@ from math import gcd, lcm
 from operator import mul
 from typing import Any, TypeAlias
 
-from .numbers import Account, demand, rational, read_dict, up, whole
+from .numbers import Account, Rows, demand, rational, read_dict, up, whole
 
 Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
@@ -170,25 +170,35 @@ def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
     return [a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))]
 
 
+def largest(rows: Sequence[Sequence[Poly]], sizes: Mapping[str, Fraction], shares: Mapping[str, int] | None = None) -> Rows:
+    """Return short upper bounds of polynomials, |p|, for variables within their sizes. shares: each monomial counts as often
+    as those of its factors do together."""
+    names = [*set[str]().union(*(p.names for row in rows for p in row))]
+    numbers, below = whole([sizes[name] for name in names])
+    ratios, bits = dict(zip(names, numbers, strict=True)), max(map(int.bit_length, (below, *numbers)))
+
+    def bound(p: Poly) -> Fraction:
+        if not p.upper:
+            return ZERO
+        Account.spend(len(p.upper), p.bits + p.degree * bits)
+        # The sums of the terms of each degree.
+        sums = [0] * (p.degree + 1)
+        for m, c in p.upper.items():
+            c = abs(c)
+            if shares is not None:
+                c *= sum([shares.get(name, 0) for name in m])
+            for name in m:
+                c *= ratios[name]
+            sums[len(m)] += c
+        return up(Fraction(reduce(lambda higher, terms: higher * below + terms, sums), p.lower * below**p.degree))
+
+    return [list(map(bound, row)) for row in rows]
+
+
 def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
-    """Return an upper bound of |p| for variables within their sizes."""
-    if not p.upper:
-        return ZERO
-    names = [*p.names]
-    numbers, lower = whole([sizes[name] for name in names])
-    ratios, bits = dict(zip(names, numbers, strict=True)), max(map(int.bit_length, (lower, *numbers)))
-    Account.spend(len(p.upper), p.bits + p.degree * bits)
-    # The sums of the terms of each degree.
-    sums = [0] * (p.degree + 1)
-    for m, c in p.upper.items():
-        c = abs(c)
-        for name in m:
-            c *= ratios[name]
-        sums[len(m)] += c
-    bound = 0
-    for terms in sums:
-        bound = bound * lower + terms
-    return up(Fraction(bound, p.lower * lower**p.degree))
+    """Return a short upper bound of |p| for variables within their sizes."""
+    ((bound,),) = largest([[p]], sizes)
+    return bound
 
 
 def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fraction]) -> Fraction:
@@ -196,10 +206,9 @@ def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fractio
     moving = [name for name in speeds if name in p.names]
     changing = [name for name in moving if sizes[name]]
     numbers, lower = whole([up(speeds[name] / sizes[name]) for name in changing])
-    shares = dict(zip(changing, numbers, strict=True))
-    along = Poly({m: c * sum([shares.get(name, 0) for name in m]) for m, c in p.upper.items()}, p.lower * lower)
+    ((along,),) = largest([[p]], sizes, dict(zip(changing, numbers, strict=True)))
     still = (most(p.slope(name), sizes) * speeds[name] for name in moving if not sizes[name])
-    return sum(still, most(along, sizes))
+    return sum(still, along / lower)
 
 
 def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:

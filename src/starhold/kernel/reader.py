@@ -8,7 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from .loops import AttitudeLoop
-from .numbers import Rows, norm, reach, root
+from .numbers import Rows, added, norm, reach, root
 from .polynomials import Poly
 from .regions import AMISS, ANGLE, AT_REST, SPEED, Radii, Region, Sizes, Tube, as_told, felt, stretch
 
@@ -73,7 +73,7 @@ class Reader(ABC):
         wrong = self.wrong(region.sizes)
         sizes = as_told(region.sizes, wrong)
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
-        all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
+        all_told = added([*full.values()], [*wrong.values()])
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
         away, (turned, rated) = sizes[ANGLE], self.noise
         near = sizes | {"v": away * away}
@@ -83,10 +83,15 @@ class Reader(ABC):
         less = [(full[k] - felt(self.unlike, k, near)) * x - full[k] * curved[k] for k, x in linear.items()]
         return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.misled(region.sizes)[0] / 2)
 
+    @cached_property
+    def extents(self) -> Sizes:
+        """Return bounds of the norms of external vectors, by their letters."""
+        sizes = {letter: [x for name, x in self.others.items() if name[0] == letter] for letter in "erah"}
+        return {letter: norm(x) if letter == "e" else max(x, default=ZERO) for letter, x in sizes.items()}
+
     def size(self, letter: str) -> Fraction:
         """Return a bound of the norm of an external vector."""
-        sizes = [x for name, x in self.others.items() if name[0] == letter]
-        return norm(sizes) if letter == "e" else max(sizes, default=Fraction(0))
+        return self.extents[letter]
 
     def load(self, sizes: Sizes, acceleration: Fraction) -> Fraction:
         """Return a bound of the torque due to the difference of the body's inertia from the given one."""
@@ -111,14 +116,14 @@ class Reader(ABC):
     def stale(self, sizes: Sizes, parts: list[Poly], turning: int = 1, letters: str = "raeh") -> Fraction:
         """Return a bound of what these changes, or some of them, do to expressions."""
         changes = self.changes(sizes, turning)
-        return sum((felt(parts, letter, sizes) * changes[letter] for letter in letters), ZERO)
+        return added([felt(parts, letter, sizes) for letter in letters], [changes[letter] for letter in letters])
 
     def renewed(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
         """Return a bound of the change of expressions from one sample to the next."""
         changes = self.changes(sizes)
         whole = {"r": 2 * changes["r"], "h": 2 * changes["h"], "a": 2 * self.size("a")}
         whole["e"] = 2 * min(self.size("e"), self.gradual(sizes))
-        return sum((felt(parts, letter, sizes) * x for letter, x in whole.items()), ZERO)
+        return added([felt(parts, letter, sizes) for letter in whole], [*whole.values()])
 
     def unlike_body(self, sizes: Sizes, parts: Sequence[list[Poly]]) -> tuple[Fraction, Fraction]:
         """Return `stale` of two lists of expressions, where momentum in the second turns with the body as without

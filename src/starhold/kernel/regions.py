@@ -6,11 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from operator import mul
 from typing import NamedTuple
 
 from .loops import AXES, RATES, TURNS
-from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, times, transpose, up, whole
-from .polynomials import Monomial, Poly, most, total
+from .numbers import RefusedError, Rows, added, demand, plus, reach, root, scalar, times, transpose, up, whole
+from .polynomials import Monomial, Poly, largest, total
 
 STATE = (*RATES, *TURNS)
 FAR = 1 << 100
@@ -104,21 +105,24 @@ def factored(p: Poly) -> Factored:
 
 def least_form(parts: Factored, region: Region) -> Rows:
     """Return the matrix of a quadratic form that bounds a polynomial from below: the cofactor of x_i x_k lies in an
-    interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
+    interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with any r > 0, here those in which the diagonal is 1,
+    or the sizes."""
     sizes, middle, radius = region.sizes, scalar(0, 6), scalar(0, 6)
     for (i, k), (more, less, uneven) in parts.items():
         if region.least < 0:
             uneven = total([uneven, *(part.only(lambda m: "q0" in m) for part in (more, less))])
             more, less = (part.only(lambda m: "q0" not in m) for part in (more, less))
         # A cofactor in q0 alone is at least its value at the least q0.
-        least = [part.only(lambda m: {*m} <= {"q0"}).at({"q0": region.least}).number for part in (more, less)]
-        high, low, spread = (most(part, sizes) for part in (more, less, uneven))
+        least = [added([c * region.least ** len(m) for m, c in p.terms.items() if {*m} <= {"q0"}]) for p in (more, less)]
+        ((high, low, spread),) = largest([[more, less, uneven]], sizes)
         above, below = high - least[1] + spread, low - least[0] + spread
         for a, b in ((i, k), (k, i)):
             middle[a][b] += (above - below) / 4
             radius[a][b] += (above + below) / 4
+    given = [middle[i][i] for i in range(6)]
+    units = [1 / root(x) for x in given] if min(given) > 0 else [sizes[name] for name in STATE]
     for i, row in enumerate(radius):
-        middle[i][i] -= up(reach([row], [sizes[name] for name in STATE])[0] / sizes[STATE[i]])
+        middle[i][i] -= up(reach([row], units)[0] / units[i])
     return middle
 
 
@@ -133,32 +137,34 @@ def outweighed(Q: Rows, c: Fraction, F: Rows, M: Rows) -> Rows:
 
 def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
     """Return a bound, in norms, of how much expressions change with a vector; zero for one that occurs in none of them."""
-    names = [name for name in sizes if name[0] == letter]
-    demand(all(name in names for p in parts for name in p.names if name[0] == letter), "the size of a vector is not stated")
-    if not names:
-        return Fraction(0)
-    rows, turned = taken_apart(tuple(tuple(p.slope(name) for name in names) for p in parts))
-    bound = stretch([[most(p, sizes) for p in row] for row in rows])
-    for letter, c in turned:
-        bound += c * (sizes[SPEED] if letter == "w" else max(sizes[f"{letter}{k + 1}"] for k in AXES))
+    rows, turned, bound = taken_apart(tuple(parts), letter, tuple(name for name in sizes if name[0] == letter))
+    bound = stretch(largest(rows, sizes)) if rows else bound
+    for other, c in turned:
+        bound += c * (sizes[SPEED] if other == "w" else max(sizes[f"{other}{k + 1}"] for k in AXES))
     return bound
 
 
 @lru_cache(256)
-def taken_apart(rows: tuple[tuple[Poly, ...], ...]) -> tuple[tuple[tuple[Poly, ...], ...], list[tuple[str, Fraction]]]:
-    """Return a matrix of polynomials without its terms c y x z, and c for each y: |y x z| <= |y| |z|, and the rest is
-    bounded by its entries. No external vector is longer than the bound of each of its components."""
-    turned = list[tuple[str, Fraction]]()
-    for letter in "wrah" if len(rows) == len(rows[0]) == 3 else "":
-        names = [f"{letter}{k + 1}" for k in AXES]
-        c = rows[1][0].terms.get((names[2],))
+def taken_apart(
+    parts: tuple[Poly, ...], letter: str, names: tuple[str, ...]
+) -> tuple[list[list[Poly]], list[tuple[str, Fraction]], Fraction]:
+    """Return the slopes of polynomials in a vector without the terms c y x z, and c for each y: |y x z| <= |y| |z|, and the
+    rest is bounded by its entries; where these are numbers their bound stands in their place. No external vector is longer
+    than the bound of each of its components."""
+    demand(all(name in names for p in parts for name in p.names if name[0] == letter), "the size of a vector is not stated")
+    rows, turned = [[p.slope(name) for name in names] for p in parts], list[tuple[str, Fraction]]()
+    for other in "wrah" if len(rows) == len(names) == 3 else "":
+        axes = [f"{other}{k + 1}" for k in AXES]
+        c = rows[1][0].terms.get((axes[2],))
         if c is None:
             continue
-        slopes = [[[p.terms.get((name,), 0) for name in names] for p in row] for row in rows]
+        slopes = [[[p.terms.get((name,), 0) for name in axes] for p in row] for row in rows]
         if slopes == [[[(0, c, -c)[x] for x in axis] for axis in row] for row in TURNED]:
-            rows = tuple(tuple(p.only(lambda m, names=names: len(m) != 1 or m[0] not in names) for p in row) for row in rows)
-            turned.append((letter, abs(c)))
-    return rows, turned
+            rows = [[p.only(lambda m, axes=axes: len(m) != 1 or m[0] not in axes) for p in row] for row in rows]
+            turned.append((other, abs(c)))
+    if any(p.names for row in rows for p in row):
+        return rows, turned, Fraction(0)
+    return [], turned, stretch(largest(rows, {})) if names else Fraction(0)
 
 
 def as_told(true: Sizes, wrong: Sizes) -> Sizes:
@@ -212,7 +218,7 @@ def stretch(rows: Rows) -> Fraction:
     numbers, below = whole([abs(x) for row in rows for x in row])
     lines = [numbers[k : k + len(rows[0])] for k in range(0, len(numbers), len(rows[0]))]
     across, down = max(map(sum, lines)), max(map(sum, zip(*lines, strict=True)))
-    return root(Fraction(min(across * down, sum(x * x for x in numbers)), below * below))
+    return root(Fraction(min(across * down, sum(map(mul, numbers, numbers))), below * below))
 
 
 def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:

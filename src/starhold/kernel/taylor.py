@@ -12,38 +12,38 @@ import operator as op
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
-from math import isqrt
+from math import isqrt, lcm
 from typing import Any, NamedTuple, TypeAlias
 
 from .numbers import Account, demand, up
 from .programs import Program
 
 PLACES, DEGREE, BITS = 100, 3, 4
-ONE = 1 << PLACES
+ONE, FIRST = 1 << PLACES, (1 << BITS) - 1
 Terms: TypeAlias = dict[int, int]
-"""Coefficients by monomials of one degree: the exponent of each input takes BITS of a whole number."""
+"""Coefficients by monomials: the degree, and then the exponent of each input, each take BITS of a whole number."""
 
 
 class Model(NamedTuple):
-    """A polynomial, by degrees, and a radius: the modelled function is within that distance of the polynomial on the box."""
+    """A polynomial and a radius: the modelled function is within that distance of the polynomial on the box."""
 
-    parts: tuple[Terms, ...]
+    terms: Terms
     radius: int
 
     @property
-    def sizes(self) -> list[int]:
-        """Return bounds of the polynomial's parts, by degrees."""
-        return [sum(map(abs, part.values())) for part in self.parts]
+    def size(self) -> int:
+        """Return a bound of the polynomial."""
+        return sum(map(abs, self.terms.values()))
 
     @property
     def constant(self) -> int:
         """Return the polynomial's value at zero."""
-        return self.parts[0].get(0, 0)
+        return self.terms.get(0, 0)
 
     @property
     def spread(self) -> int:
         """Return the largest distance of the function, on the box, from the polynomial's value at zero."""
-        return sum(self.sizes[1:]) + self.radius
+        return self.size - abs(self.constant) + self.radius
 
 
 Value: TypeAlias = Model | bool
@@ -52,7 +52,7 @@ Value: TypeAlias = Model | bool
 def number(x: Fraction) -> Model:
     """Return a number that depends on no input."""
     whole, rest = divmod(x.numerator << PLACES, x.denominator)
-    return Model(({0: whole} if whole else {}, *[{}] * DEGREE), int(rest > 0))
+    return Model({0: whole} if whole else {}, int(rest > 0))
 
 
 def multiple(size: Fraction) -> int:
@@ -60,25 +60,29 @@ def multiple(size: Fraction) -> int:
     return -((-size.numerator << PLACES) // size.denominator)
 
 
+def linear(place: int) -> int:
+    """Return the monomial of an input."""
+    return 1 | 1 << BITS * (place + 1)
+
+
 def within(size: Fraction, place: int) -> Model:
     """Return the input in a place, with this bound."""
-    return Model(({}, {1 << BITS * place: multiple(size)}, *[{}] * (DEGREE - 1)), 0)
+    return Model({linear(place): multiple(size)}, 0)
 
 
 def add(x: Model, y: Model) -> Model:
     """Return a sum."""
-    parts = list[Terms]()
-    for a, b in zip(x.parts, y.parts, strict=True):
-        both = dict(a)
-        for m, c in b.items():
-            both[m] = both.get(m, 0) + c
-        parts.append(both)
-    return Model(tuple(parts), x.radius + y.radius)
+    Account.spend(2 + len(y.terms), PLACES)
+    both = dict(x.terms)
+    for m, c in y.terms.items():
+        both[m] = both.get(m, 0) + c
+    return Model(both, x.radius + y.radius)
 
 
 def negative(x: Model) -> Model:
     """Return the negative."""
-    return Model(tuple({m: -c for m, c in part.items()} for part in x.parts), x.radius)
+    Account.spend(len(x.terms), PLACES)
+    return Model({m: -c for m, c in x.terms.items()}, x.radius)
 
 
 def subtract(x: Model, y: Model) -> Model:
@@ -89,29 +93,34 @@ def subtract(x: Model, y: Model) -> Model:
 def multiply(x: Model, y: Model) -> Model:
     """Return a product; terms of higher degree go to the radius."""
     for a, b in ((x, y), (y, x)):
-        if not a.radius and not any(a.parts[1:]):
+        if not a.radius and a.terms.keys() <= {0}:
             return multiplied(b, a.constant)
-    parts, left, right, rounded = list[Terms](), x.sizes, y.sizes, 0
-    for degree in range(DEGREE + 1):
-        product = dict[int, int]()
-        for k in range(degree + 1):
-            for m, c in x.parts[k].items():
-                for n, d in y.parts[degree - k].items():
-                    product[m + n] = product.get(m + n, 0) + c * d
-        rounded += sum(c & (ONE - 1) > 0 for c in product.values())
-        parts.append({m: c >> PLACES for m, c in product.items()})
-    # A model's size is at most that of its parts and its radius, and rounding changes a coefficient by less than one.
-    higher = sum(a * b for i, a in enumerate(left) for k, b in enumerate(right) if i + k > DEGREE)
-    apart = higher + x.radius * (sum(right) + y.radius) + sum(left) * y.radius
-    return Model(tuple(parts), -(-apart >> PLACES) + rounded)
+    Account.spend(4 + len(x.terms) * len(y.terms), PLACES)
+    product, higher = dict[int, int](), 0
+    for m, c in x.terms.items():
+        room = DEGREE - (m & FIRST)
+        for n, d in y.terms.items():
+            if n & FIRST <= room:
+                product[m + n] = product.get(m + n, 0) + c * d
+            else:
+                higher += abs(c * d)
+    # A model's size is at most that of its polynomial and its radius.
+    apart = higher + x.radius * (y.size + y.radius) + x.size * y.radius
+    return rounded({m: c for m, c in product.items() if c}, apart)
 
 
 def multiplied(x: Model, c: int) -> Model:
     """Return a model times a number of multiples."""
-    products = [{m: c * d for m, d in part.items()} if c else {} for part in x.parts]
-    rounded = sum(d & (ONE - 1) > 0 for part in products for d in part.values())
-    parts = tuple({m: d >> PLACES for m, d in part.items()} for part in products)
-    return Model(parts, -(-abs(c) * x.radius >> PLACES) + rounded)
+    Account.spend(2 + len(x.terms), PLACES)
+    return rounded({m: c * d for m, d in x.terms.items()} if c else {}, abs(c) * x.radius)
+
+
+def rounded(products: Terms, apart: int) -> Model:
+    """Return a model from twice as many places: rounding changes a coefficient by less than one, which the radius holds."""
+    return Model(
+        {m: c >> PLACES for m, c in products.items()},
+        sum([c & (ONE - 1) > 0 for c in products.values()]) - (-apart >> PLACES),
+    )
 
 
 def series(x: Model, coefficients: Sequence[Fraction], rest: Fraction) -> Model:
@@ -119,7 +128,7 @@ def series(x: Model, coefficients: Sequence[Fraction], rest: Fraction) -> Model:
     value = number(coefficients[-1])
     for c in coefficients[-2::-1]:
         value = add(multiply(value, x), number(c))
-    return Model(value.parts, value.radius - (-rest.numerator << PLACES) // rest.denominator)
+    return Model(value.terms, value.radius - (-rest.numerator << PLACES) // rest.denominator)
 
 
 def relative(y: Model) -> tuple[Fraction, Model, Fraction]:
@@ -196,39 +205,34 @@ def run(program: Program, given: Mapping[str, Model], count: int) -> list[Model]
         if operation == "constant":
             values.append(number(operands))
             continue
-        chosen = [values[k] for k in operands]
-        models = [[len(part) for part in x.parts] for x in chosen if isinstance(x, Model)]
-        work = sum(map(sum, models))
-        if operation in ("product", "divide", "sqrt"):
-            pairs = sum(a * b for i, a in enumerate(models[0]) for b in models[-1][: DEGREE + 1 - i])
-            # A quotient or root takes a few products of models in which all terms may occur.
-            work += pairs if operation == "product" else 12 * sum(models[-1]) ** 2
-        Account.spend(8 + work, PLACES)
-        values.append(OPERATIONS[operation](*chosen))
+        Account.spend(2, PLACES)
+        values.append(OPERATIONS[operation](*[values[k] for k in operands]))
     return [values[k] for k in program.outputs]
 
 
 def slope(model: Model, size: Fraction, place: int) -> Fraction:
     """Return the approximate slope at zero in the input of a place."""
-    return Fraction(model.parts[1].get(1 << BITS * place, 0), multiple(size))
+    return Fraction(model.terms.get(linear(place), 0), multiple(size))
 
 
 def beyond(model: Model, sizes: Sequence[Fraction], row: Sequence[Fraction]) -> tuple[list[Fraction], Fraction]:
     """Return D and c: on the box of these sizes a model differs from row.z by at most D.|z| + c. A monomial is shared among
     its inputs; none of them exceeds its size."""
-    wide = [Fraction(multiple(size), ONE) for size in sizes]
-    shares = [abs(slope(model, x, k) - entry) * x for k, (x, entry) in enumerate(zip(wide, row, strict=True))]
-    for degree, part in enumerate(model.parts[2:], 2):
-        for m, c in part.items():
-            for place in places(m):
-                shares[place] += Fraction(abs(c), ONE * degree)
-    spread = Fraction(abs(model.constant) + model.radius, ONE)
-    return [up(share / x) for share, x in zip(shares, wide, strict=True)], spread
+    wide, among = [Fraction(multiple(size), ONE) for size in sizes], lcm(*range(2, DEGREE + 1))
+    shares = [0] * len(sizes)
+    for m, c in model.terms.items():
+        for place in places(m >> BITS) if m & FIRST > 1 else ():
+            shares[place] += abs(c) * (among // (m & FIRST))
+    steep = [
+        up(abs(slope(model, x, k) - entry) + Fraction(share, among * ONE) / x)
+        for k, (x, entry, share) in enumerate(zip(wide, row, shares, strict=True))
+    ]
+    return steep, Fraction(abs(model.constant) + model.radius, ONE)
 
 
 def places(m: int) -> Iterator[int]:
     """Yield the places of a monomial's inputs, each as often as it occurs."""
     place = 0
     while m:
-        yield from [place] * (m & (1 << BITS) - 1)
+        yield from [place] * (m & FIRST)
         m, place = m >> BITS, place + 1

@@ -106,6 +106,10 @@ def widened(loop: ClosedLoop, name: str, issued: Sequence[Issued], wanted: Wante
         one = switches[link.name]
         sought = replace(wanted, alone=True, momentum=link.momentum, like=link.claim)
         wider = certify(one.after, link.name, sought)
+        if wider.outcome != "proved" and link.claim is not None:
+            # With more momentum from a smaller start, which the link then assumes.
+            begun = link.claim.numbers["rate_start"]
+            wider = certify(one.after, link.name, replace(sought, like=None, begun=begun))
         if wider.outcome != "proved":
             continue
         before, after = one.places

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib import import_module
-from math import inf
+from math import inf, log
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,15 +23,38 @@ from starhold.kernel.held import Held
 from starhold.kernel.numbers import RefusedError, plus, times, transpose
 from starhold.kernel.regions import STATE, Tube, balls
 from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
-from starhold.kernel.theorems.response import first_of, responds
+from starhold.kernel.theorems.response import Response, first_of, responds
 
 linalg: Any = import_module("scipy.linalg")
 
-FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 8.0, 20, 24
+FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 4.0, 40, 24
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
 the largest ratio of successive levels; the most levels and ellipsoids."""
+LOWER, SHORTEST, WORTH, ALIKE = 0.9, 0.12, 1.003, 1.005
+"""The share of a level that the next one is at most; the least share of the largest ratio, in powers; up to which multiple
+of the last bound no further response is worth its time, and up to which multiple of another a bound counts as no wider."""
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
+Ends: TypeAlias = tuple[float, float]
+"""Ultimate bounds of angle (rad) and rate (rad/s)."""
+
+
+class Falls(list[Lower]):
+    """Tau, beta and the lowest level proved to be reached from another; the lowest of these levels comes first."""
+
+    @property
+    def pace(self) -> float:
+        """Return by what share V decreases at most in a unit of time."""
+        return max((float(beta) for _, beta, _ in self), default=0.0)
+
+    def quickest(self, c: Fraction, end: Fraction) -> Lower:
+        """Return that by which motions come soonest from one level to another."""
+
+        def lasts(one: Lower) -> float:
+            _, beta, floor = map(float, one)
+            return log((float(c) - floor) / (float(end) - floor)) / beta if FLOOR * floor <= float(end) * MORE else inf
+
+        return min(self, key=lasts)
 
 
 @dataclass
@@ -39,12 +64,14 @@ class Chain:
     motion: Held
     V: str
     level: float
-    tried: dict[Any, Lower | None] = field(default_factory=dict[Any, "Lower | None"])
-    """The results of `lower`, for all chains of one V."""
+    tried: dict[Any, Falls] = field(default_factory=dict[Any, Falls])
+    """The results of `falls`, for all chains of one V."""
     shape: Shape = field(default_factory=lambda: Shape(0.0))
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     response: dict[str, Any] = field(default_factory=dict[str, Any])
+    reached: list[int] = field(default_factory=list[int])
+    """After how many samples motions are in each of the levels."""
     samples: int = 0
 
     @property
@@ -54,15 +81,20 @@ class Chain:
         sizes = motion.region(Fraction(self.level)).sizes
         return {name: float(sizes[name]) or 1.0 for name in (*STATE, *motion.others)}
 
+    @property
+    def nearly_linear(self) -> Fraction:
+        """Return a level in which all motions are."""
+        return (self.motion.s + self.motion.G[3][3]) / 2**20
+
     def aim(self) -> float:
         """Return the level that disturbances allow where all motions are nearly linear."""
-        lower = self.lower((self.motion.s + self.motion.G[3][3]) / 2**20)
+        lower = self.lower(self.nearly_linear)
         return inf if lower is None else float(lower[2])
 
     def decreases(self) -> bool:
-        """Return whether V decreases on the whole set, down to a lower level."""
+        """Return whether V decreases on the whole set, down to a noticeably lower level."""
         lower = self.lower(Fraction(self.level))
-        return lower is not None and lower[2] < Fraction(self.level)
+        return lower is not None and float(lower[2]) * FLOOR <= self.level * LOWER
 
     def of_level(self) -> dict[str, Any]:
         """Return the claim's numbers that follow from its level."""
@@ -74,52 +106,55 @@ class Chain:
         return {"level": self.level} | late | {"plan.error": float(off) * MORE}
 
     def descend(self) -> float:
-        """Find the levels, and return the last."""
-        c, tube = Fraction(self.level), None
-        while len(self.levels) < LEVELS and (lower := self.lower(c)) is not None:
-            tau, beta, floor = lower
-            end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
-            if end > c * Fraction(9, 10):
+        """Find the levels, and return the last. Where V hardly decreases, they follow each other closely."""
+        c, tube, pace = Fraction(self.level), None, self.falls(self.nearly_linear).pace
+        while len(self.levels) < LEVELS and (falls := self.falls(c)):
+            ratio = DEEPEST ** min(max(falls.pace / pace if pace else 1.0, SHORTEST), 1.0)
+            end = Fraction(max(float(falls[0][2]) * FLOOR, float(c) / ratio))
+            if float(end) > float(c) * LOWER:
                 break
+            tau, beta, floor = falls.quickest(c, end)
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
             tube, more = on_level(self.motion, end, tube or self.motion.tube(self.motion.region(c)))
             self.samples += periods(self.motion.h * beta, floor, c, end) + more
+            self.reached.append(self.samples)
             c = end
         return float(c)
 
     def lower(self, c: Fraction) -> Lower | None:
         """Return tau and beta for the lowest level proved to be reached from another, and that level."""
+        return next(iter(self.falls(c)), None)
+
+    def falls(self, c: Fraction) -> Falls:
+        """Return how V decreases from a level."""
         key = c, self.motion.late
         if key not in self.tried:
-            self.tried[key] = self.lowest(c)
+            self.tried[key] = self.sought(c)
         return self.tried[key]
 
-    def lowest(self, c: Fraction) -> Lower | None:
-        """Find what `lower` returns."""
+    def sought(self, c: Fraction) -> Falls:
+        """Find what `falls` returns."""
         motion = self.motion
         try:
             exact, above, felt, push, rest, spare = motion.fall(on_level(motion, c)[0])
         except RefusedError:
-            return None
+            return Falls()
         Q, H, F = floats(exact), floats(above), floats(felt)
         if float(np.linalg.eigvalsh(Q)[0]) <= 0.0:
-            return None
+            return Falls()
         R = F.T @ F
         largest = 1.0 / float(linalg.eigh(R, Q, eigvals_only=True)[-1])
-
-        def floor(share: float) -> tuple[float, float, float]:
-            tau = largest * share
+        falls = Falls()
+        for tau in largest * np.linspace(0.02, 0.98, 33):
             beta = float(linalg.eigh(Q - tau * R, H, eigvals_only=True)[0]) * (1.0 - 1e-6)
             beta = min(beta, float(spare) * (1.0 - 1e-6) / float(motion.h))
-            return ((float(push) ** 2 / (4.0 * tau) + float(rest)) / beta if beta > 0.0 else inf), tau, beta
+            if beta > 0.0:
+                t, b = Fraction(float(tau)), Fraction(beta)
+                falls.append((t, b, (push * push / (4 * t) + rest) / b))
+        falls.sort(key=lambda one: one[2])
+        return falls
 
-        _, tau, beta = min(floor(share) for share in np.linspace(0.02, 0.98, 33))
-        if beta <= 0.0:
-            return None
-        t, b = Fraction(tau), Fraction(beta)
-        return t, b, (push * push / (4 * t) + rest) / b
-
-    def tighten(self, tube: Tube) -> tuple[float, float]:
+    def tighten(self, tube: Tube) -> Ends:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
         angle, fastest = ends(self.motion, tube, tube.region.X)
         heed, corners = HEED, self.motion.corners()
@@ -154,34 +189,67 @@ class Chain:
             tube, entered, (angle, fastest) = inner, X, end
         return angle, fastest
 
-    def nearest(self) -> tuple[Chain, tuple[float, float]]:
+    def nearest(self) -> tuple[Chain, Ends]:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
-        (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
-        tube, _ = on_level(self.motion, Fraction(self.levels[-1]["end"]))
-        self.motion.nears(tube)
-        one = replace(self, ellipsoids=list[Any]())
-        ends = [(one, one.respond(tube))]
-        if not one.response or self.motion.loop.wheels:
-            ends.append((self, self.tighten(tube)))
-        return min(ends, key=lambda pair: pair[1][0])
+        (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response. They begin in the level from
+        which motions are there the soonest."""
+        evidence, count = find_response(self.motion), len(self.levels)
+        response = None if evidence is None else concluded(responds(self.motion, evidence["weights"], evidence["gains"]))
 
-    def respond(self, tube: Tube) -> tuple[float, float]:
-        """Find how often the response brings motions nearer, and return the ultimate bounds."""
-        motion, evidence = self.motion, find_response(self.motion)
-        (begun, pulled), rounds = first_of(motion, tube), 0
-        angle, fastest = ends(self.motion, tube, tube.region.X)
-        response = None if evidence is None else concluded(responds(motion, evidence["weights"], evidence["gains"]))
-        while evidence is not None and response is not None and rounds < ROUNDS:
+        def respond(chain: Chain, tube: Tube, /) -> Ends:
+            return chain.respond(tube, evidence, response)
+
+        one = self.ended(respond, count)
+        ways: list[tuple[Callable[[Chain, Tube], Ends], tuple[Chain, Ends]]] = [(respond, one)]
+        if not one[0].response or self.motion.loop.wheels:
+            ways.append((Chain.tighten, self.ended(Chain.tighten, count)))
+        way, best = min(ways, key=lambda pair: pair[1][1][0])
+        most, after = best[1][0] * ALIKE, best[0].samples - self.reached[-1]
+        sooner = dict[int, tuple[Chain, Ends]]()
+
+        def near(count: int) -> bool:
+            try:
+                sooner[count] = self.ended(way, count)
+            except (RefusedError, np.linalg.LinAlgError):
+                # Too far from the target.
+                return False
+            return sooner[count][1][0] <= most
+
+        first = bisect_left(range(1, count), True, key=near) + 1
+        for place in range(first, count):
+            # From lower levels no less follows than from the last.
+            if self.reached[place - 1] + after >= best[0].samples:
+                break
+            if place in sooner or near(place):
+                best = min(best, sooner[place], key=lambda one: one[0].samples)
+        return best
+
+    def ended(self, way: Callable[[Chain, Tube], Ends], count: int) -> tuple[Chain, Ends]:
+        """Return the chain with only so many levels and what follows them, and the ultimate bounds."""
+        one = replace(self, levels=self.levels[:count], ellipsoids=list[Any](), samples=self.reached[count - 1])
+        tube, _ = on_level(self.motion, Fraction(one.levels[-1]["end"]))
+        self.motion.nears(tube)
+        return one, way(one, tube)
+
+    def respond(self, tube: Tube, evidence: dict[str, Any] | None, response: Response | None) -> Ends:
+        """Find how often a response brings motions nearer, and return the ultimate bounds."""
+        motion = self.motion
+        (begun, pulled), samples = first_of(motion, tube), self.samples
+        after = [(samples, ends(self.motion, tube, tube.region.X))]
+        while evidence is not None and response is not None and len(after) <= ROUNDS:
             try:
                 within, more = forgotten(motion, tube)
-                begun, pulled, inner = response.after(motion, within, begun, pulled)
-                more += waited(motion, within, inner)
+                begun, pulled, tube = response.after(motion, within, begun, pulled)
+                more += waited(motion, within, tube)
             except RefusedError:
                 break
-            end = ends(self.motion, inner, balls(begun), motion.away)
-            if not end[0] < angle * 0.999:
+            end = ends(self.motion, tube, balls(begun), motion.away)
+            if not end[0] < after[-1][1][0] * 0.999:
                 break
-            tube, (angle, fastest), rounds = inner, end, rounds + 1
-            self.samples += response.count + more
-            self.response = {"response": evidence | {"rounds": rounds}}
-        return angle, fastest
+            samples += response.count + more
+            after.append((samples, end))
+        # As often as is worth the time.
+        rounds = next(k for k, (_, end) in enumerate(after) if end[0] <= after[-1][1][0] * WORTH)
+        self.samples, end = after[rounds]
+        self.response = {"response": (evidence or {}) | {"rounds": rounds}} if rounds else {}
+        return end

@@ -56,7 +56,7 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
     sizes = [float(np.linalg.norm(B, 2)) for B in pushes]
     weight = np.log(np.array([x / sum(sizes) + 1e-12 for x in sizes] + [NEARLY]))
     begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
-    options = {"maxfev": 400, "initial_simplex": begun}
+    options = {"maxfev": 400, "initial_simplex": begun, "xatol": 0.03, "fatol": 3e-4}
     optimize: Any = import_module("scipy.optimize")
     # Where no trial is finite, their differences are not numbers.
     with np.errstate(invalid="ignore"):
@@ -138,5 +138,5 @@ def ends(motion: Held, tube: Tube, X: Rows, swayed: Radii = AT_REST) -> tuple[fl
     sine = (turned + float(motion.bend_between(tube))) * MORE
     half = sine
     for _ in range(60):
-        half = sine + half**3 / 6.0
+        half = sine + min(half, 1.0) ** 3 / 6.0
     return 2.0 * half * MORE if half < 1.0 else inf, fastest

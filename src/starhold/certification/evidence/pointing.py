@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.chains import Chain, Lower
+from starhold.certification.evidence.chains import Chain, Falls
 from starhold.certification.evidence.ellipsoids import MORE
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.lates import begun_late, numbers_of, resting, weighed
@@ -23,7 +23,7 @@ from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.shapes import Shape, largest_in, soft
-from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
+from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
 from starhold.certification.matrices import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled
 from starhold.kernel.held import CHANGE, Held
@@ -89,12 +89,12 @@ def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pus
 
 
 class Lean(NamedTuple):
-    """A V by its shape and digest, the loop with it, and the results of `lower`."""
+    """A V by its shape and digest, the loop with it, and the results of `falls`."""
 
     shape: Shape
     V: str
     motion: Held
-    tried: dict[Any, Lower | None]
+    tried: dict[Any, Falls]
 
 
 class Pushed:
@@ -205,31 +205,20 @@ class Pushed:
         return False
 
     def begun(self, angle: float, rate: float, limits: dict[str, float]) -> list[Chain]:
-        """Return chains from a start set, the first of `trials` that are any; none, and the reason in `failed`, where V does
-        not decrease on the set or the torque exceeds its limits there."""
+        """Return chains from a start set; none, and the reason in `failed`, where V does not decrease on the set or the
+        torque exceeds its limits there. Within limits it is one, by the first V for which neither is so."""
         loop, numbers = self.loop, self.beginning(angle, rate, limits)
-        loop.failed[POINTS] = "the torque exceeds its limit"
-        for chains in self.trials(angle, rate, limits):
-            first = chains[0]
-            if asks_more(first.motion, first.level, limits):
-                continue
-            if not any(chain.decreases() for chain in chains):
-                loop.failed[POINTS] = RISES
-            elif begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
-                return chains
+        shapes = [lean.shape for lean in self.leans] if not limits else self.within(angle, rate, limits)
+        loop.failed[POINTS] = RISES if shapes else "the torque exceeds its limit"
+        chains = [self.chain(shape, angle, rate) for shape in shapes] if not limits else []
+        for first in chains or (self.chain(shape, angle, rate) for shape in shapes):
+            if first.decreases() and begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
+                return chains or [first]
         return []
 
-    def trials(self, angle: float, rate: float, limits: dict[str, float]) -> Iterator[list[Chain]]:
-        """Yield chains to try together: one for each lean of V; or within limits one at a time, for each V whose set demands
-        little torque, and at last for the locally best one."""
-        if not limits:
-            yield [self.chain(lean.shape, angle, rate) for lean in self.leans]
-            return
-        shapes = soft(self.sampled(self.usual[0]).motion, limits, angle, rate)
-        for shape in shapes:
-            yield [self.chain(shape, angle, rate)]
-        if (best := self.leans[0].shape) not in shapes:
-            yield [self.chain(best, angle, rate)]
+    def within(self, angle: float, rate: float, limits: dict[str, float]) -> list[Shape]:
+        """Return shapes of V to try within limits: of those whose set demands little torque, and of the usual ones."""
+        return soft(self.sampled(self.usual[0]).motion, limits, angle, rate, self.usual)
 
     def beginning(self, angle: float, rate: float, limits: dict[str, float]) -> dict[str, Any]:
         """Return the claim's numbers of a start, without its level."""

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 LEFT, SHORTEST = 7.0, 5.0
 """Minus the logarithm of the share of a state that is left after the samples of a response, and the least of it where that
 takes too many."""
+ALIKE, AT_ONCE = 1.15, (64, 48, 32, 24, 16, 12, 8, 1)
+"""The largest ratio of two of the samples that get one weight, and the numbers of samples that may."""
 FINEST, LONGEST, LEAST, MORE = 1e3, 1e9 - 1.0, 1e-4, 1.0 + 1e-7
 """The least and the largest weight, the least share of a sample relative to the mean, and the margin for rounding."""
 
@@ -77,5 +79,17 @@ def weigh(squares: Array) -> Array:
     even = np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0])
     scale = float(roots(even).sum())
     best = roots(optimize.minimize(cost, even, method="BFGS").x)
-    best = np.maximum(best, LEAST * best.mean())
+    best = evened(np.maximum(best, LEAST * best.mean()))
     return best.max() / best
+
+
+def evened(best: Array) -> Array:
+    """Return numbers of which consecutive ones that hardly differ are replaced by the root of their mean square: the kernel
+    sums samples of one weight at once."""
+    result, place = best.copy(), 0
+    while place < len(best):
+        ahead = best[place:]
+        count = next(n for n in AT_ONCE if n <= len(ahead) and ahead[:n].max() <= ALIKE * ahead[:n].min())
+        result[place : place + count] = np.sqrt(np.mean(ahead[:count] ** 2))
+        place += count
+    return result

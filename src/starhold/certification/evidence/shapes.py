@@ -5,14 +5,16 @@ torque is limited: its level sets contain rates that no motion from rest reaches
 ones.
 """
 
+from collections.abc import Sequence
 from itertools import product
-from math import sin
+from math import inf, pi, sin
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
+from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
 from starhold.kernel.numbers import inverse
@@ -26,6 +28,10 @@ LEANS = (0.1, 0.18, 0.3, 0.45, 0.6, 0.75, 0.9)
 """The shares of the potential that are tried, and epsilon in sqrt(the potential's stiffness / the largest moment)."""
 WITHIN = (0.98, 0.88, 0.75, 0.6)
 """Shares of a limit that are tried for the torque of the linear motion: nonlinear terms, momentum and errors add to it."""
+
+STATES, AROUND = 2000, "erah"
+"""At how many states of a set torque is examined, and what is around it: a torque that the law is given, the target's rate
+and acceleration, and the wheels' momentum."""
 
 
 class Shape(NamedTuple):
@@ -61,9 +67,10 @@ def shares(motion: Held, limits: dict[str, Any]) -> Array:
     return np.concatenate(rows)
 
 
-def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
+def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> tuple[Array, Array]:
     """Return, for matrices P of V, how definite -V' is, as a share of its diagonal, with the acceleration near the target
-    and q turned to this q0. The margin is for nonlinear terms, momentum and sampling."""
+    and q turned to this q0, and by what share V decreases at least in a unit of time. The margin is for nonlinear terms,
+    momentum and sampling."""
     bent = any("q0" in m and not m.isdisjoint(STATE[TURN]) for p in motion.u for m in map(frozenset, p.terms))
     flow, turned = np.zeros(P.shape), q0[:, None, None]
     flow[:, RATE, RATE], flow[:, RATE, TURN] = acceleration[:, RATE], acceleration[:, TURN] * (turned if bent else 1.0)
@@ -74,12 +81,16 @@ def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> Array:
         slope[:, TURN, RATE] += P[:, TURN, TURN] * (1.0 - turned) / 2.0
     form = -(slope + slope.transpose(0, 2, 1))
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", form), 1e-300))
-    return np.asarray(np.linalg.eigvalsh(form / scale[:, :, None] / scale[:, None, :])[:, 0], dtype=np.float64)
+    within = np.linalg.inv(np.linalg.cholesky(P))
+    forms = form / scale[:, :, None] / scale[:, None, :], within @ form @ within.transpose(0, 2, 1)
+    definite, pace = (np.asarray(np.linalg.eigvalsh(one)[:, 0], dtype=np.float64) for one in forms)
+    return definite, pace
 
 
-def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> list[Shape]:
+def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float, others: Sequence[Shape]) -> list[Shape]:
     """Return shapes of V whose level set around a start demands about no more than the limits: for each of some shares the
-    least softened ones, and of them the most definite. motion: with the potential as it is."""
+    least softened ones, and of them the most definite; and others, if theirs does so. Those that decrease fastest near the
+    target come first. motion: with the potential as it is."""
     J, torque = floats(motion.loop.given), floats(motion.near.torque)
     potential, loads = floats(motion.form(motion.s / 2))[TURN, TURN], shares(motion, limits) @ torque
     stiff, moment = float(np.linalg.eigvalsh(potential)[-1]), float(np.trace(J)) / 3.0
@@ -88,6 +99,7 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> lis
         Shape(float(f"{lean * slow:.4g}"), share, about)
         for share, lean, about in product(SOFT, LEANS, (None, float(f"{moment:.4g}")))
     ]
+    shapes = [*dict.fromkeys([*shapes, *others])]
     forms = np.zeros((len(shapes), 6, 6))
     for one, shape in zip(forms, shapes, strict=True):
         M = J if shape.moment is None else shape.moment * np.eye(3)
@@ -101,14 +113,37 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float) -> lis
     stiff = np.linalg.eigvalsh(P[:, TURN, TURN] - P[:, TURN, RATE] @ np.linalg.solve(P[:, RATE, RATE], P[:, RATE, TURN]))
     far = level / stiff[:, 0]
     least = np.sqrt(np.maximum(1.0 - far, 0.0)) if motion.even else 1.0 - far / 2.0
-    margins = np.minimum(*(falls(motion, P, inner @ torque, q0) for q0 in (np.ones(len(P)), least)))
+    margins, paces = map(np.minimum, *(falls(motion, P, inner @ torque, q0) for q0 in (np.ones(len(P)), least)))
     margins[least <= -(not motion.even)] = -np.inf
-    chosen = dict[Shape, None]()
     softness, ball = np.array([s.soft for s in shapes]), np.array([s.moment is not None for s in shapes])
+    chosen = {k for k, s in enumerate(shapes) if s in others and margins[k] > 0.0}
     for share, about in product(WITHIN, (False, True)):
         fit = (used < share) & (margins > 0.0) & (ball == about)
         # With one moment about all axes, the gyroscopic torque does work: there the most definite one is taken.
         fit &= about | (softness == softness[fit].max(initial=0.0))
         if fit.any():
-            chosen[shapes[int(np.argmax(np.where(fit, margins, -np.inf)))]] = None
-    return list(chosen)
+            chosen.add(int(np.argmax(np.where(fit, margins, -np.inf))))
+    return [shapes[k] for k in sorted(chosen, key=lambda k: -paces[k]) if not asks_more(motion, P[k], level[k], limits)]
+
+
+def asks_more(motion: Held, P: Array, level: float, limits: dict[str, Any]) -> bool:
+    """Return whether the law commands more than its limits at some state of {V <= level} and of what is around it. P:
+    the matrix of V near the target."""
+    r = np.random.default_rng(1)
+    along, axes, *around = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2 + len(AROUND), 3, STATES)))
+    half = r.uniform(0.0, pi, STATES)
+    q, far = np.sin(half) * axes, 1.0 - np.cos(half)
+    # V is quadratic in the rate along each direction.
+    a, b = (along * (P[RATE, RATE] @ along)).sum(0), (along * (P[RATE, TURN] @ q)).sum(0)
+    turned = q if motion.even else q * np.sqrt(2.0 * far) / np.maximum(np.sin(half), 1e-300)
+    c = (turned * (P[TURN, TURN] @ turned)).sum(0) - level
+    inside = b * b >= a * c
+    fast = (np.sqrt(np.where(inside, b * b - a * c, 0.0)) - b) / a
+    names: list[str] = ["q0", *STATE[TURN], *STATE[RATE]]
+    x = dict(zip(names, (np.cos(half), *q, *(fast * along)), strict=True))
+    rows = [(f"{letter}{k + 1}", v) for letter, one in zip(AROUND, around, strict=True) for k, v in enumerate(one)]
+    x |= {name: float(motion.others[name]) * v for name, v in rows if name in motion.others}
+    u = np.array([valued(p, x) + np.zeros(STATES) for p in motion.loop.u])
+    used = np.abs(shares(motion, limits) @ u).max(axis=0, initial=0.0)
+    used = np.maximum(used, np.linalg.norm(u, axis=0) / limits.get("limit.norm", inf))
+    return bool(used[inside].max(initial=0.0) > 1.0)

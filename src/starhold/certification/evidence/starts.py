@@ -4,7 +4,6 @@ sets."""
 from collections.abc import Mapping
 from fractions import Fraction
 from itertools import takewhile
-from math import inf, pi
 from typing import Any
 
 import numpy as np
@@ -16,21 +15,15 @@ from starhold.certification.evidence.cones import interior_point
 from starhold.certification.evidence.finding import NotFoundError, evidence, read
 from starhold.certification.evidence.sparse import entries_of
 from starhold.certification.evidence.squares import DEFINITE, cofactors, equations, free, posed, settled
-from starhold.certification.evidence.terms import valued
-from starhold.certification.matrices import floats
-from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError
-from starhold.kernel.regions import RATE, STATE, TURN
 from starhold.kernel.rules import Squares
 from starhold.kernel.theorems.pointing import points
 from starhold.loop.closed_loop import ClosedLoop
 
 Array = NDArray[np.float64]
 POINTS = "points"
-STATES = 2000
-"""At how many states of a set torque is examined."""
 
 
 def start_rate(loop: ClosedLoop) -> float:
@@ -54,25 +47,6 @@ def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
         loop.failed[POINTS] = str(reason)
         return False
     return True
-
-
-def asks_more(motion: Held, level: float, limits: dict[str, float]) -> bool:
-    """Return whether the law commands more than its limit at some state of {V <= level}."""
-    most = min((x for name, x in limits.items() if name.startswith("limit")), default=inf)
-    r, G, s = np.random.default_rng(1), floats(motion.G), float(motion.s)
-    along, axes = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2, 3, STATES)))
-    half = r.uniform(0.0, pi, STATES)
-    q = np.sin(half) * axes
-    # V is quadratic in the rate along each direction.
-    a, b = (along * (G[RATE, RATE] @ along)).sum(0), (along * (G[RATE, TURN] @ q)).sum(0)
-    c = s * (1.0 - np.cos(half)) + (q * (G[TURN, TURN] @ q)).sum(0) - level
-    inside = b * b >= a * c
-    far = (np.sqrt(np.where(inside, b * b - a * c, 0.0)) - b) / a
-    names: list[str] = ["q0", *STATE[TURN], *STATE[RATE]]
-    x = dict(zip(names, (np.cos(half), *q, *(far * along)), strict=True))
-    u = [valued(p, x) for p in motion.u]
-    size = np.linalg.norm(u, axis=0) if "limit.norm" in limits else np.abs(u).max(axis=0)
-    return bool(size[inside].max(initial=0.0) > most)
 
 
 def feedback(loop: AttitudeLoop) -> float:

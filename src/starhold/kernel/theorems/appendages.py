@@ -108,7 +108,7 @@ def points_with_appendages(claim: Claim) -> Proof:
 def responds(motion: Appended, weights: object, gains: object) -> Part[Response]:
     """The gains bound those of the linear motion of body and appendages: of rates, turns and the linear acceleration, under
     external torques, which vary freely within a period, and under held torque errors."""
-    return summed(scalar(1, motion.n)[:6] + motion.pull, PARTS, motion.sampled, motion.ways, KINDS, weights, gains)
+    return summed(scalar(1, motion.n)[:6] + motion.pull, PARTS, motion.sampled, motion.ways, KINDS, weights, gains, True)
 
 
 def settled(motion: Appended, response: Response, period: Period, box: Box, radii: Column) -> tuple[Fraction, Fraction]:

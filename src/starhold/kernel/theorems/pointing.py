@@ -235,7 +235,7 @@ def on_level(motion: Held, c: Fraction, before: Tube | None = None) -> tuple[Tub
     before: the tube in which motions came there."""
     tube = motion.tube(motion.region(c))
     samples = waited(motion, before, tube) if before else 0
-    for _ in range(2 * bool(motion.late)):
+    if motion.late:
         tube, more = forgotten(motion, tube, False)
         samples += more
     return tube, samples

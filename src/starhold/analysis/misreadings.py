@@ -22,10 +22,12 @@ NEAR = 1e-9
 def misreadings(claim: Claim, loop: ClosedLoop, span: Any) -> list[NDArray[np.bool_]]:
     """Return for each estimate that a claim is about, and without one for readings that are off in proportion to the motion,
     masks (n,) of the samples of a `Span` at which the error exceeds the claimed bound, but for NEAR."""
-    told = [(fitted, ("attitude", "rate")) for fitted in loop.used("estimator") if "settled-estimate" in claim.assumptions]
+    measured = [
+        (fitted, ("attitude", "rate")) for fitted in loop.used("estimator") if "settled-estimate" in claim.assumptions
+    ]
     if not loop.used("estimator") and "told_growth" in claim.numbers:
-        told = [(f, tuple(shown(f) & {"attitude", "rate"})) for f in loop.used("sensor") if is_recorded(f.part)]
-    if not any(names for _, names in told):
+        measured = [(f, tuple(shown(f) & {"attitude", "rate"})) for f in loop.used("sensor") if is_recorded(f.part)]
+    if not any(names for _, names in measured):
         return []
     attitude, rate = _largest(claim, span)
 
@@ -35,7 +37,7 @@ def misreadings(claim: Claim, loop: ClosedLoop, span: Any) -> list[NDArray[np.bo
         turned: Any = relative(tuple(span["attitude"].T), tuple(seen.T))
         return error_angle(np.transpose(turned)) > attitude
 
-    return [exceeds(x, span[f"{f.called.replace('-', '_')}_{x}"]) for f, names in told for x in names]
+    return [exceeds(x, span[f"{f.called.replace('-', '_')}_{x}"]) for f, names in measured for x in names]
 
 
 def _largest(claim: Claim, span: Any) -> Array:

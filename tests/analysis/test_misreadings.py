@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from starhold.analysis.departure import covered, departures
-from starhold.analysis.told_errors import misreadings
+from starhold.analysis.misreadings import misreadings
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly
 from starhold.studies.body import study_of
-from tests.certification.test_late_readings import LATE, OWN, loop_with
+from tests.certification.own_spacecraft import LATE, OWN, loop_with
 
 STEP = 0.25
 STEADY = {"share": None, "attitude_error": 1e-4, "rate_error": 1e-5}
@@ -24,10 +24,10 @@ class Flown(dict):
     unit = 1.0
 
     def __init__(self, rate, off, turned):
-        told = np.zeros((len(rate), 4))
-        told[:, 0], told[:, 2] = np.cos(turned / 2.0), np.sin(turned / 2.0)
+        seen = np.zeros((len(rate), 4))
+        seen[:, 0], seen[:, 2] = np.cos(turned / 2.0), np.sin(turned / 2.0)
         true = {"time": np.arange(len(rate)) * STEP, "attitude": np.eye(4)[[0] * len(rate)], "rate": rate}
-        super().__init__(true, complementary_filter_attitude=told, complementary_filter_rate=rate + off)
+        super().__init__(true, complementary_filter_attitude=seen, complementary_filter_rate=rate + off)
 
 
 def wrong(flight, **numbers):
