@@ -8,7 +8,7 @@ from starhold.certification.certify import certify
 from starhold.certification.field import field_along, positions
 from starhold.parts.magnetic_field import field, prepared
 from starhold.scenario.building import build
-from tests.kernel.tumbling import turned
+from tests.kernel import flights
 
 EPOCH = (2026.0, 3.0, 20.0, 12.0, 0.0, 0.0)
 ELLIPSE = {
@@ -65,7 +65,7 @@ def test_flights_with_all_parts_keep_the_claim(law, rate):
     b, q, w = (B / np.linalg.norm(B, axis=1)[:, None]).T, run.attitude.values.T, run.rate.values
     energy = 0.5 * (w**2 * np.array([0.05, 0.065, 0.025])).sum(axis=1)
     held = b[:, 1:-1]
-    turning = np.linalg.norm(turned(q[:, 2:], held) - turned(q[:, :-2], held), axis=0) / (2.0 * loop.period)
+    turning = np.linalg.norm(flights.seen(q[:, 2:], held) - flights.seen(q[:, :-2], held), axis=0) / (2.0 * loop.period)
     gained = np.diff(energy)[1:] / loop.period
     fast = np.linalg.norm(w, axis=1)
     numbers, seen = claim.numbers, 0
