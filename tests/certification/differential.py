@@ -2,6 +2,7 @@
 
 import copy
 import math
+import warnings
 
 import numpy as np
 
@@ -82,7 +83,9 @@ def judged(path, issued, said, changed, tables):
     its own one, and how they were judged. issued: of each law its name, its certificate, its claim as it flies, if that is
     proved, and its loop; said: what is left open of the scenario that they were made for."""
     try:
-        scenario = sh.scenario(tables)
+        with warnings.catch_warnings(action="ignore"):
+            # Of an orbit that meets the ground, say.
+            scenario = sh.scenario(tables)
         differing = compare_programs(path, scenario)
         loops = {name: build(scenario, scenario.pick(name)) for name, *_ in issued}
         left = [text for text in left_open(path, scenario) if text not in said]

@@ -202,7 +202,7 @@ def test_no_period_exceeds_the_bounds_of_what_is_late_and_some_come_near_them(la
     ways = np.vstack([np.eye(6), rng.normal(size=(300, 6))])
     most = sum(np.linalg.norm(ways @ floats(B)[:6], axis=1) * float(b) for B, b in held.linear(first))
     state = np.vstack([x, floats(held.near.torque) @ x + late[0]])[: len(held.near.A)]
-    assert 0.9 < float((np.abs(ways @ (after - floats(held.near.A)[:6] @ state)) / most[:, None]).max()) <= 1.0
+    assert 0.7 < float((np.abs(ways @ (after - floats(held.near.A)[:6] @ state)) / most[:, None]).max()) <= 1.0
 
 
 @pytest.mark.parametrize(("lag", "substeps"), [(0.05, 4), (0.2, 1), (0.3, 1), (1.0, 1), (0.02, 10)])
