@@ -299,8 +299,8 @@ class Oracle(Driven):
 
         self.lanes = 2 * tries
         fleet = self.fleet()
-        # What is in a memory is drawn here, in place of what it adds. Of plans the program flies, which `plans` compares with
-        # them: how far they may be from it shrinks with the state.
+        # What is in a memory is drawn here, in place of what it adds. Of plans the program flies, which `plans` checks: how
+        # far they may be from it shrinks with the state.
         self.kept, fleet.added = 1e9, 0.0
         states = [self.border(V0, level * self.rng.uniform()) for _ in range(tries)]
         states += [(self.shrunk(turned(self.rng), V0, level * 10.0 ** self.rng.uniform(-6, 0)), zero) for _ in range(tries)]

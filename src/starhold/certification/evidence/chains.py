@@ -91,10 +91,10 @@ class Chain:
         lower = self.lower(self.nearly_linear)
         return inf if lower is None else float(lower[2])
 
-    def decreases(self) -> bool:
-        """Return whether V decreases on the whole set, down to a noticeably lower level."""
+    def decreases(self, noticeably: bool) -> bool:
+        """Return whether V decreases on the whole set, down to a lower level, or a noticeably lower one."""
         lower = self.lower(Fraction(self.level))
-        return lower is not None and float(lower[2]) * FLOOR <= self.level * LOWER
+        return lower is not None and float(lower[2]) * (FLOOR / LOWER if noticeably else 1.0) < self.level
 
     def of_level(self) -> dict[str, Any]:
         """Return the claim's numbers that follow from its level."""

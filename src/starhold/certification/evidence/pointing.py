@@ -212,7 +212,8 @@ class Pushed:
         loop.failed[POINTS] = RISES if shapes else "the torque exceeds its limit"
         chains = [self.chain(shape, angle, rate) for shape in shapes] if not limits else []
         for first in chains or (self.chain(shape, angle, rate) for shape in shapes):
-            if first.decreases() and begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
+            # Without limits larger sets may follow, on which disturbances matter less.
+            if first.decreases(bool(limits)) and begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
                 return chains or [first]
         return []
 
