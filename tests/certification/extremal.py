@@ -144,7 +144,8 @@ class Steered(Attack):
             z = np.einsum("nij,jn->in", motion.A, z) + np.einsum("nij,jn->in", made, y[size:])
             sizes = np.array([np.linalg.norm(part, axis=0) for part in (y[size : size + 3], y[size + 3 :], z[:3], z[3:6])])
             most = np.maximum(most, (sizes / radii).max(axis=0))
-        return [one / most for one in errors]
+        # Lanes in which noise drives nothing towards the end have none.
+        return [one / np.where(most > 0.0, most, 1.0) for one in errors]
 
     def fly(self, ends, axis=None):
         """Fly one lane in each direction of the angle, (3, lanes)."""
