@@ -12,7 +12,7 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly
 from starhold.studies.body import study_of
-from tests.certification.own_spacecraft import LATE, OWN, loop_with
+from tests.certification.own_spacecraft import LATE, OWN, TEXTS, loop_with
 
 STEP = 0.25
 STEADY = {"share": None, "attitude_error": 1e-4, "rate_error": 1e-5}
@@ -33,7 +33,7 @@ class Flown(dict):
 def wrong(flight, **numbers):
     """The samples at which attitude and rate are told more wrongly than a claim with these numbers says."""
     claim = SimpleNamespace(numbers=STEADY | numbers, assumptions=("settled-estimate",))
-    return np.array(misreadings(claim, loop_with("filtered")[1], flight))
+    return np.array(misreadings(claim, loop_with(TEXTS["filtered"])[1], flight))
 
 
 def test_an_estimate_without_noise_is_compared_with_its_bounds():

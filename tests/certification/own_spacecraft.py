@@ -1,10 +1,16 @@
-"""A spacecraft with late sensors, used directly and through a filter."""
+"""Own spacecraft, claims about them and attacks on these; one has late sensors, used directly and through a filter."""
 
+from dataclasses import replace
 from functools import cache
 
+import numpy as np
+
+from starhold.certification.certify import certify
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
-from starhold.studies.bodies.rigid_body import certified_loops
+from starhold.studies.bodies.rigid_body import certified_loops, wanted_of
+from tests.certification.attack import Attack, flown
+from tests.certification.extremal import Steered
 
 OWN = """
 name = "own"
@@ -54,12 +60,35 @@ type = "complementary-filter"
 attitude_gain = 0.2
 bias_gain = 0.01
 """
-PARTS = {"late": LATE, "filtered": FILTERED}
+TEXTS = {"late": OWN + LATE, "filtered": OWN + FILTERED}
 
 
 @cache
-def loop_with(parts):
-    scenario = parse(OWN + PARTS[parts], "own.toml", None)
+def loop_with(text):
+    """The scenario of a text, and the loop of its first law."""
+    scenario = parse(text, "own.toml", None)
     entry = scenario.laws[0]
     (loop,) = certified_loops(scenario, entry, build(scenario, entry)).values()
     return scenario, loop
+
+
+@cache
+def claim_of(text):
+    """The claim about that loop as it flies."""
+    scenario, loop = loop_with(text)
+    return certify(loop, "own", replace(wanted_of(scenario, True), alone=True)).claim("pointing")
+
+
+def worst_of(text, flights, lanes, steered, rounds=1):
+    """The worst steered flight under the claim, which neither this nor flights of the loop itself nor pushes break. steered:
+    the lanes and the most samples of those flights."""
+    claim = claim_of(text)
+    assert flown(loop_with(text)[1], claim, np.random.default_rng(1), flights) < 1.0
+    given = {"programs": dict(claim.proof.programs)}, claim.proof.claim, 1
+    attack = Attack(*given, lanes)
+    attack.longest = 800
+    assert not attack.worst()[0]
+    worst = Steered(*given, *steered).search(rounds)[0]
+    assert worst.angle < 1.0
+    assert worst.rate < 1.0
+    return worst

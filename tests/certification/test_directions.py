@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from functools import cache
 from types import ModuleType, SimpleNamespace
 from typing import NamedTuple
 
@@ -15,18 +14,13 @@ from starhold.algebra.vector import Vector
 from starhold.analysis.departure import Span
 from starhold.certification.assumptions import assumption
 from starhold.certification.certificate import FRESH
-from starhold.certification.certify import certify
 from starhold.certification.directions import WIDER
 from starhold.certification.measured import measured
 from starhold.parts.catalogue import fit
 from starhold.parts.contract import DEVIATIONS, Direction
 from starhold.parts.estimators import quest, triad
-from starhold.scenario.building import build
-from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly, label
-from starhold.studies.bodies.rigid_body import certified_loops, wanted_of
-from tests.certification.attack import Attack, flown
-from tests.certification.extremal import Steered
+from tests.certification.own_spacecraft import claim_of, loop_with, worst_of
 from tests.kernel.flights import along
 from tests.tiers import WHOLE, fewer, leading
 
@@ -91,23 +85,9 @@ SLOWER = OWN.replace('noise = "0.05 deg"', 'noise = "0.05 deg"\ninterval = 0.5\n
 TEXTS = {"triad": OWN + TRIAD, "quest": OWN + QUEST, "late": SLOWER.replace("position = 10.0", "jitter = 0.001") + TRIAD}
 
 
-@cache
-def loop_with(name):
-    scenario = parse(TEXTS[name], "own.toml", None)
-    entry = scenario.laws[0]
-    (loop,) = certified_loops(scenario, entry, build(scenario, entry)).values()
-    return scenario, loop
-
-
-@cache
-def claim_of(name):
-    scenario, loop = loop_with(name)
-    return certify(loop, "own", replace(wanted_of(scenario, True), alone=True)).claim("pointing")
-
-
 @pytest.mark.parametrize("name", leading(TEXTS, 0))
 def test_an_own_spacecraft_has_a_claim_with_all_of_its_sensors(name):
-    claim = claim_of(name)
+    claim = claim_of(TEXTS[name])
     assert (claim.outcome, claim.left_out) == ("proved", [])
     assert claim.numbers["angle"] < {"triad": 0.026, "quest": 0.036, "late": 0.06}[name]
     assert claim.numbers["share"] == pytest.approx(0.9973)
@@ -118,15 +98,7 @@ def test_an_own_spacecraft_has_a_claim_with_all_of_its_sensors(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TEXTS)
 def test_flights_do_not_break_the_claim(name):
-    (_, loop), claim = loop_with(name), claim_of(name)
-    assert flown(loop, claim, np.random.default_rng(1), 200) < 1.0
-    given = {"programs": dict(claim.proof.programs)}, claim.proof.claim, 1
-    attack = Attack(*given, 50)
-    attack.longest = 800
-    assert not attack.worst()[0]
-    worst = Steered(*given, 100, 1500).search(2)[0]
-    assert 0.5 < worst.angle < 1.0
-    assert worst.rate < 1.0
+    assert worst_of(TEXTS[name], 200, 50, (100, 1500), rounds=2).angle > 0.5
 
 
 def with_changed(loop, name, **numbers):
@@ -152,13 +124,13 @@ def with_changed(loop, name, **numbers):
     ],
 )
 def test_what_has_no_bound_is_left_out(name, numbers):
-    loop = loop_with("triad")[1]
+    loop = loop_with(TEXTS["triad"])[1]
     assert measured(loop) is not None
     assert measured(with_changed(loop, name, **numbers)) is None
 
 
 def test_coarse_sun_sensors_are_left_out_but_not_where_the_estimator_does_not_read_them():
-    loop = loop_with("triad")[1]
+    loop = loop_with(TEXTS["triad"])[1]
     coarse = fit("sensor", "coarse-sun-sensors")
     assert measured(replace(loop, parts=(*loop.parts, coarse))) is not None
     assert measured(replace(loop, parts=(coarse, *loop.parts))) is None
@@ -179,7 +151,7 @@ def test_a_sensor_of_two_directions_that_tells_errors_of_one_is_left_out():
         sun: Vector
         sun_is_seen: float
 
-    loop = loop_with("quest")[1]
+    loop = loop_with(TEXTS["quest"])[1]
     assert measured(with_module(loop, "horizon-sensor")) is not None
     assert measured(with_module(loop, "horizon-sensor", Reading=Both)) is None
     other = {"direction": lambda params, period, sky: Direction("sun", 1e-3)}
@@ -192,7 +164,7 @@ def test_an_own_estimator_that_does_not_tell_its_age_is_left_out():
         rate: Vector
         is_valid: float
 
-    loop = loop_with("triad")[1]
+    loop = loop_with(TEXTS["triad"])[1]
     assert measured(with_module(loop, "triad")) is not None
     assert measured(with_module(loop, "triad", Estimate=Ageless)) is None
 
@@ -215,7 +187,7 @@ def test_a_direction_is_further_from_another_by_the_angle_between_them(sine):
 @pytest.mark.parametrize("every", [2, 3, 7])
 def test_a_body_that_accelerates_between_readings_of_the_gyro_puts_a_carried_attitude_off(every):
     """It turns to and fro, with each turn over when the gyro is read."""
-    loop, period, most = loop_with("triad")[1], 0.25, 0.1
+    loop, period, most = loop_with(TEXTS["triad"])[1], 0.25, 0.1
     for name in ("sun-sensor", "magnetometer"):
         loop = with_changed(loop, name, interval=every * period)
     numbers, unseen = triad.prepare(triad.Params(), period), {"sun": (0.0, 0.0, 0.0), "sun_is_seen": 0.0}
@@ -229,12 +201,12 @@ def test_a_body_that_accelerates_between_readings_of_the_gyro_puts_a_carried_att
 
 
 def test_a_limit_that_the_field_does_not_reach_does_nothing():
-    loop = loop_with("triad")[1]
+    loop = loop_with(TEXTS["triad"])[1]
     assert measured(with_changed(loop, "magnetometer", limit=1e-4)).amiss == measured(loop).amiss
 
 
 def test_flights_in_which_directions_are_missing_leave_the_claim():
-    loop = with_changed(loop_with("triad")[1], "sun-sensor", outage=(0.5, 1.5))
+    loop = with_changed(loop_with(TEXTS["triad"])[1], "sun-sensor", outage=(0.5, 1.5))
     run = label(loop, *fly(loop, 12), 1)
     for age, missed in ((0.0, 4), (0.25, 3), (1.0, 0)):
         ((unmet, _),) = assumption(f"{FRESH}{age!r}").unmet(Span(loop, run))

@@ -3,14 +3,12 @@
 from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from starhold.certification.certify import certify
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.finding import read
 from starhold.certification.matrices import floats
@@ -24,41 +22,25 @@ from starhold.kernel.theorems import pointing
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import Noise
 from starhold.parts.estimators import complementary_filter
-from starhold.studies.bodies.rigid_body import wanted_of
-from tests.certification.attack import Attack, flown
-from tests.certification.extremal import Steered
-from tests.certification.own_spacecraft import PARTS, loop_with
+from tests.certification.own_spacecraft import TEXTS, claim_of, loop_with, worst_of
 from tests.kernel.flights import along, seen, turned_on
 from tests.tiers import leading
 
 
-@cache
-def claim_of(parts):
-    scenario, loop = loop_with(parts)
-    return certify(loop, "own", replace(wanted_of(scenario, True), alone=True)).claim("pointing")
-
-
-@pytest.mark.parametrize("parts", leading(PARTS))
+@pytest.mark.parametrize("parts", leading(TEXTS))
 def test_an_own_spacecraft_has_a_claim_with_all_of_its_sensors(parts):
-    (_, loop), claim = loop_with(parts), claim_of(parts)
+    claim = claim_of(TEXTS[parts])
     assert (claim.outcome, claim.left_out) == ("proved", [])
     assert claim.numbers["angle"] < 0.02
     assert claim.numbers["slew_angle"] > 1.0
     assert any(claim.numbers["told_growth"])
-    assert flown(loop, claim, np.random.default_rng(1), 16) < 1.0
-    given = {"programs": dict(claim.proof.programs)}, claim.proof.claim, 1
-    attack = Attack(*given, 30)
-    attack.longest = 800
-    assert not attack.worst()[0]
     # What is late is in the flights that come near the bound.
-    worst = Steered(*given, 40, 1000).search(1)[0]
-    assert 0.4 < worst.angle < 1.0
-    assert worst.rate < 1.0
+    assert worst_of(TEXTS[parts], 16, 30, (40, 1000)).angle > 0.4
 
 
-@pytest.mark.parametrize("parts", leading(PARTS))
+@pytest.mark.parametrize("parts", leading(TEXTS))
 def test_a_claim_with_less_than_its_parts_say_is_of_another_loop(parts):
-    (_, loop), claim = loop_with(parts), claim_of(parts).proof.claim
+    (_, loop), claim = loop_with(TEXTS[parts]), claim_of(TEXTS[parts]).proof.claim
     assert not differences(claim, loop)
     grown = [name for name in GROWING if Fraction(claim["numbers"].get(name, 0))]
     assert len(grown) > 3
@@ -75,7 +57,7 @@ EACH |= {"error.rate.per.acceleration": 1.0}
 
 def held(**numbers):
     Account.left = 10**12
-    proof = claim_of("late").proof
+    proof = claim_of(TEXTS["late"]).proof
     kept = {name: x for name, x in proof.claim["numbers"].items() if name not in GROWING}
     given = kept | {name.replace("_", "."): str(Fraction(x)) for name, x in numbers.items()}
     return Held(AttitudeLoop(read(proof.claim | {"numbers": given}, dict(proof.programs)), remembers=True))
@@ -232,7 +214,7 @@ def test_the_filter_that_flies_comes_as_far_as_its_bound_says_and_no_further(rea
 
 
 def test_an_estimate_that_does_not_forget_is_left_out_by_name():
-    _, loop = loop_with("filtered")
+    _, loop = loop_with(TEXTS["filtered"])
     (fitted,) = loop.used("estimator")
     assert measured(loop) is not None
     slow = replace(fitted, params=fitted.params._replace(bias_gain=0.0))

@@ -14,11 +14,12 @@ from starhold.parts.part import Fitted
 from starhold.parts.vectors import KINDS
 
 WIDER, LONGEST = 1.16, 100.0
-"""What directions are, and so what their noise does to the attitude, follows from what noise did before. Let at each sample
-the covariance of what it adds be at most some S, whatever came before. Then the mean of exp(l.y) is at most that of a
-Gaussian y of the covariances S, for any l, so that P(|y| > k) <= (k^2/3)^(3/2) exp(3/2 - k^2/2) for a y of three components
-and unit covariance (the mean over Gaussian l of covariance 1 - 3/k^2). This is less than the kernel's bound for a y wider by
-1.16 wherever that is below 1e-4; and it is, for any share of an orbit or an hour, with control periods of up to 100 s."""
+"""Noise turns the body, and what later noise does to the attitude depends on the directions that are measured then. Let at
+each sample the covariance of what it adds be at most some S, whatever came before. Then the mean of exp(l.y) is at most that
+of a Gaussian y of the covariances S, for any l, so that P(|y| > k) <= (k^2/3)^(3/2) exp(3/2 - k^2/2) for a y of three
+components and unit covariance (the mean over Gaussian l of covariance 1 - 3/k^2). This is less than the kernel's bound for a
+y wider by 1.16 wherever that is below 1e-4; and it is, for any share of an orbit or an hour, with control periods of up to
+100 s."""
 AGE = "attitude_age"
 """The estimate that tells whether directions are there (s)."""
 NEAR = 5e-3

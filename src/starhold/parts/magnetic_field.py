@@ -31,8 +31,8 @@ FIRST, LAST = (days_of((year, 1.0, 1.0, 0.0, 0.0, 0.0)) for year in (2025.0, 203
 GRID = radians(2.0)
 """The angle between points at which the field is computed for a bound on its strength."""
 COARSE, DIVISIONS, CELLS, STEP, CLOSE = radians(5.0), 16, 20_000, 10.0, 0.98
-"""Of the search for the least strength: half the angle of its first cells, how often cells are divided, and how many there
-may be; the distance (m) of the points that give a derivative; and the share of the least strength that is shown."""
+"""The search for the least strength begins with cells of twice this angle, divides them so often, and ends where there are
+more than so many; points at this distance (m) give a derivative; and it shows this share of the least strength."""
 MORE = 1.0 + 1e-9
 Row: TypeAlias = tuple[int, int, float, float, float, float]
 ROWS: tuple[Row, ...] = (

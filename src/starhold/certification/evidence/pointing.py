@@ -210,11 +210,12 @@ class Pushed:
         loop, numbers = self.loop, self.beginning(angle, rate, limits)
         shapes = [lean.shape for lean in self.leans] if not limits else self.within(angle, rate, limits)
         loop.failed[POINTS] = RISES if shapes else "the torque exceeds its limit"
-        chains = [self.chain(shape, angle, rate) for shape in shapes] if not limits else []
-        for first in chains or (self.chain(shape, angle, rate) for shape in shapes):
+        made = (self.chain(shape, angle, rate) for shape in shapes)
+        together = [] if limits else [*made]
+        for first in together or made:
             # Without limits larger sets may follow, on which disturbances matter less.
             if first.decreases(bool(limits)) and begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
-                return chains or [first]
+                return together or [first]
         return []
 
     def within(self, angle: float, rate: float, limits: dict[str, float]) -> list[Shape]:
