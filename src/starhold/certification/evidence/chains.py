@@ -91,8 +91,8 @@ class Chain:
         lower = self.lower(self.nearly_linear)
         return inf if lower is None else float(lower[2])
 
-    def decreases(self, noticeably: bool) -> bool:
-        """Return whether V decreases on the whole set, down to a lower level, or a noticeably lower one."""
+    def decreases(self, noticeably: bool = True) -> bool:
+        """Return whether V decreases on the whole set, down to a noticeably lower level, or to any lower one."""
         lower = self.lower(Fraction(self.level))
         return lower is not None and float(lower[2]) * (FLOOR / LOWER if noticeably else 1.0) < self.level
 

@@ -214,7 +214,9 @@ class Pushed:
         together = [] if limits else [*made]
         for first in together or made:
             # Without limits larger sets may follow, on which disturbances matter less.
-            if first.decreases(bool(limits)) and begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
+            if first.decreases(noticeably=bool(limits)) and begins(
+                loop, self.claim(first.V, numbers | first.of_level()), first.scales
+            ):
                 return together or [first]
         return []
 
