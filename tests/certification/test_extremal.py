@@ -8,6 +8,7 @@ import pytest
 
 import starhold as sh
 from starhold.certification.certify import Wanted, certify
+from starhold.certification.evidence.chains import ALIKE
 from starhold.scenario.building import build
 from starhold.studies.bodies.rigid_body import STUDY
 from tests.certification.borders import Limited
@@ -47,7 +48,8 @@ def test_the_worst_flight_of_a_random_loop_ends_within_its_bound(seed, kind, tol
     claim = claimed(seed, tolerance, kind)
     end = np.array(way)[:, None] / np.linalg.norm(way)
     worst = Steered(*given(claim), 1, 1, 4000).fly(end)
-    assert share - 0.002 < worst.angle <= 1.0
+    # A bound that holds sooner may be wider.
+    assert share / ALIKE - 0.002 < worst.angle <= 1.0
     assert worst.rate <= 1.0
 
 
