@@ -30,7 +30,7 @@ def test_what_is_proved_lies_between_the_exact_sum_and_the_star_norm(name, entri
     assert exact <= free * (1.0 + 1e-9)
     assert free <= claimed
     assert exact < ellipsoid < 1.2 * exact
-    # By its response a claim is nearer than any ellipsoid is; what is not linear costs a little, and so does an earlier time.
+    # By its response a claim is nearer than any ellipsoid is; what is not linear and an earlier time cost a little.
     assert claimed < 1.02 * ALIKE * (free if stored["by_response"] else ellipsoid)
     assert claimed < ellipsoid or not stored["by_response"]
 
