@@ -12,15 +12,15 @@ demo: $(VENV)/.run
 # The linters, of which one takes as long as a third of the tests, run beside them.
 test: $(VENV)/.test
 	@$(MAKE) --no-print-directory check > $(VENV)/check.log 2>&1 & check=$$!; \
-	$(BIN)/python -m pytest -n 2 --dist loadfile; tests=$$?; \
+	$(BIN)/python -m pytest --workers 2; tests=$$?; \
 	wait $$check; check=$$?; cat $(VENV)/check.log; exit $$((tests + check))
 
 # A part of the tests for the time between two changes: under a minute.
 test-fast: $(VENV)/.test
-	$(BIN)/python -m pytest -n 2 --dist loadfile -q tests/algebra tests/analysis tests/loop tests/parts tests/synthesis tests/scenario --ignore tests/parts/test_wheels.py --ignore tests/parts/test_one_file.py --ignore tests/parts/test_bounds_attacked.py --ignore tests/parts/test_watching_estimators.py --ignore tests/parts/test_parts_against_oracles.py
+	$(BIN)/python -m pytest --workers 2 -q tests/algebra tests/analysis tests/loop tests/parts tests/synthesis tests/scenario --ignore tests/parts/test_wheels.py --ignore tests/parts/test_one_file.py --ignore tests/parts/test_bounds_attacked.py --ignore tests/parts/test_watching_estimators.py --ignore tests/parts/test_parts_against_oracles.py
 
 test-all: check
-	STARHOLD_TESTS=whole $(BIN)/python -m pytest -n 2 --dist loadfile -m ""
+	STARHOLD_TESTS=whole $(BIN)/python -m pytest --workers 2 -m ""
 
 check: $(VENV)/.test
 	$(BIN)/ruff check .
@@ -35,9 +35,10 @@ docs: $(VENV)/.docs
 	$(BIN)/python docs/generate.py
 	$(BIN)/mkdocs build --strict
 
-# One installation for each purpose; Python compiles what is imported, a small part of what is installed.
+# One installation for each purpose; Python compiles what is imported, a small part of what is installed. The pip that comes
+# with Python may be years old, and takes twice as long as a new one.
 $(VENV)/.run $(VENV)/.test $(VENV)/.bench $(VENV)/.docs: $(VENV)/.%: pyproject.toml constraints.txt
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	test -x $(BIN)/python || { $(PYTHON) -m venv $(VENV) && $(PIP) --no-compile --upgrade pip; }
 	$(PIP) --no-compile -e .$(if $(filter run,$*),,[$*])
 	touch $@
 

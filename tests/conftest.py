@@ -16,6 +16,7 @@ from hypothesis import settings
 from starhold.kernel.numbers import Account
 from starhold.loop import kernels
 from starhold.trace import calling, machine
+from tests import workers
 from tests.proofs import share
 from tests.tiers import SEED, WHOLE, fewer
 
@@ -29,46 +30,15 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("starhold", deadline=None, derandomize=True, max_examples=fewer(100, 4))
 settings.load_profile("starhold")
 
-SECONDS = "starhold/seconds"
-"""Where the cache keeps how long each file took in the last run."""
 
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config, log):
-    """Give whole files to workers, those first that took longest in the last run: no worker is left with one at the end."""
-    if config.getvalue("dist") != "loadfile":
-        return None
-    from xdist.scheduler import LoadFileScheduling
-
-    seconds = config.cache.get(SECONDS, {}) if hasattr(config, "cache") else {}
-
-    class LongestFirst(LoadFileScheduling):
-        def _assign_work_unit(self, node):
-            longest = max(self.workqueue, key=lambda file: seconds.get(file, 0.0))
-            self.workqueue.move_to_end(longest, last=False)
-            super()._assign_work_unit(node)
-
-    return LongestFirst(config, log)
-
-
-class Stopwatch:
-    """Adds up how long the tests of each file take."""
-
-    def __init__(self, cache):
-        self.cache, self.seconds = cache, {}
-
-    def pytest_runtest_logreport(self, report):
-        file = report.nodeid.split("::")[0]
-        self.seconds[file] = self.seconds.get(file, 0.0) + report.duration
-
-    def pytest_sessionfinish(self):
-        self.cache.set(SECONDS, self.cache.get(SECONDS, {}) | self.seconds)
+def pytest_addoption(parser):
+    parser.addoption("--workers", type=int, default=1, metavar="N", help="share whole files of tests among N processes")
 
 
 def pytest_configure(config):
-    # Of workers the one process that starts them counts.
-    if not hasattr(config, "workerinput") and getattr(config, "cache", None) is not None:
-        config.pluginmanager.register(Stopwatch(config.cache))
+    config.pluginmanager.register(workers)
+    if getattr(config, "cache", None) is not None:
+        config.pluginmanager.register(workers.Stopwatch(config.cache))
 
 
 def pytest_report_header():
@@ -81,17 +51,17 @@ def pytest_terminal_summary(terminalreporter):
         terminalreporter.write_line(f"What is drawn is drawn again by STARHOLD_SEED={SEED}.")
 
 
-def pytest_collection_finish():
-    """Leave what is loaded by now out of the collections of garbage: it stays to the end."""
+def pytest_sessionstart():
+    """Look for garbage after all is read: what is read stays to the end."""
+    gc.disable()
+
+
+def pytest_collection_finish(session):
+    """Leave what is loaded by now out of the collections of garbage, and keep what is proved in one folder of the run."""
     gc.collect()
     gc.freeze()
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _proofs(tmp_path_factory):
-    """Workers keep what they prove in one folder of the run, beside their own."""
-    own = tmp_path_factory.getbasetemp()
-    share((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "proofs")
+    gc.enable()
+    share(session.config._tmp_path_factory.getbasetemp() / "proofs")
 
 
 @pytest.fixture(autouse=True)

@@ -145,7 +145,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=300, help="mutants in all")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=[*GROUPS], nargs="+", default=[*GROUPS], help="groups")
-    parser.add_argument("--tests", default="-n 2 --dist loadfile tests", help="words for pytest after the nearest; '': none")
+    parser.add_argument("--tests", default="--workers 2 tests", help="words for pytest after the nearest; '': none")
     parser.add_argument("--limit", type=int, default=1800, help="seconds after which a run counts as one without end")
     parser.add_argument("--output", type=Path, default=Path(os.devnull), help="a JSON file")
     options = parser.parse_args()
