@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-NEXT, LAST = [1, 2, 0], [2, 0, 1]
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 def cross(a, b):
-    return a[NEXT] * b[LAST] - a[LAST] * b[NEXT]
+    return a.take(NEXT, 0) * b.take(LAST, 0) - a.take(LAST, 0) * b.take(NEXT, 0)
 
 
 def along(v):

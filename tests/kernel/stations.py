@@ -11,7 +11,7 @@ from starhold.certification.station import certify_station
 from starhold.laws import l2_circle, l2_equilibrium
 from starhold.laws.catalogue import catalogue
 from starhold.parts.bodies.libration_point import PRIMARIES, PointState
-from tests.kernel.oracle import number, run
+from tests.kernel.programs import number, run, written
 from tests.making import built, point_loop
 
 PLANT = PRIMARIES["sun-earth"].point("L2")
@@ -47,7 +47,7 @@ class StationOracle:
 
     def __init__(self, content, claim, seed=0):
         self.theorem, self.rng = claim["theorem"], np.random.default_rng(seed)
-        self.programs = {role: content["programs"][name] for role, name in claim["programs"].items()}
+        self.programs = {role: written(content["programs"][name]) for role, name in claim["programs"].items()}
         self.numbers = {name: number(x) for name, x in claim["numbers"].items()}
         self.subject = {name: number(x) for name, x in claim["subject"].items()}
 

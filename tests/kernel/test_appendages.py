@@ -26,6 +26,7 @@ from tests.kernel.certificates import failing
 from tests.kernel.flights import turned_on
 from tests.kernel.oracle import number
 from tests.kernel.programs import run as run_in_floats
+from tests.kernel.programs import written
 from tests.kernel.swaying import MODES, MOMENTS, Swaying, content_of, found, issued_of, loop_of
 from tests.tiers import leading
 
@@ -404,10 +405,11 @@ def test_models_hold_what_programs_do():
     names = [*(f"rate.{k}" for k in range(3)), *(f"state.{k}" for k in range(4)), *(f"torque.{k}" for k in range(3))]
     sizes = dict(zip(names, map(Fraction, (0.05, 0.04, 0.03, 0.2, 0.1, 0.2, 0.1, 0.2, 0.3, 0.1)), strict=True))
     Account.open()
+    told = written(program)
     models = run(Program.read(program), {name: within(size, k) for k, (name, size) in enumerate(sizes.items())}, 7)
     for _ in range(200):
         x = random.choice([-1.0, 1.0], 10) * random.uniform(size=10) ** random.choice([0.05, 1.0])
-        values = run_in_floats(program, {name: y * float(sizes[name]) for name, y in zip(names, x, strict=True)})
+        values = run_in_floats(told, {name: y * float(sizes[name]) for name, y in zip(names, x, strict=True)})
         for model, value in zip(models, values, strict=True):
             terms = [(m >> BITS, c) for m, c in model.terms.items()]
             powers = [c / ONE * np.prod([x[k] ** (m >> 4 * k & 15) for k in range(10)]) for m, c in terms]

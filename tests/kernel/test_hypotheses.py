@@ -17,6 +17,7 @@ from tests.kernel.flights import along, rates, stepped
 from tests.kernel.handmade import C, K, case, energy, feedback
 from tests.kernel.oracle import Oracle
 from tests.kernel.programs import run
+from tests.kernel.programs import written as told_by
 from tests.tiers import fewer, leading
 
 
@@ -234,12 +235,12 @@ def test_jumps_of_the_sign_that_raise_v_keep_a_body_spinning(jumps):
     taken = {"taken": ["hysteresis"], "hysteresis": 0.05} if jumps else {}
     claim, programs = case(swirling, swirls, "converges strictly", **taken)
     assert failing(claim, programs) == ({"a jump lowers V"} if jumps else set())
-    one, rng = np.eye(3), np.random.default_rng(3)
+    one, rng, law = np.eye(3), np.random.default_rng(3), told_by(programs[claim["programs"]["law"]])
     q, w = along(rng.normal(size=(4, 6))), along(rng.normal(size=(3, 6)))
 
     def slope(q, w):
         told = {f"measurement.{name}.{k}": x for name, v in (("attitude", q), ("rate", w)) for k, x in enumerate(v)}
-        return rates(one, one, q, w, run(programs[claim["programs"]["law"]], told))
+        return rates(one, one, q, w, run(law, told))
 
     for _ in range(1000):
         q, w = stepped(slope, (q, w), 0.06)

@@ -30,6 +30,8 @@ FIRST, LAST = (days_of((year, 1.0, 1.0, 0.0, 0.0, 0.0)) for year in (2025.0, 203
 """Range of validity of the coefficients, in days since J2000."""
 GRID = radians(2.0)
 """The angle between points at which the field is computed for a bound on its strength."""
+PARALLELS = 12
+"""On so many parallels it is computed at once, which takes a few tens of MB."""
 COARSE, DIVISIONS, CELLS, STEP, CLOSE = radians(5.0), 16, 20_000, 10.0, 0.98
 """The search for the least strength begins with cells of twice this angle, divides them so often, and ends where there are
 more than so many; points at this distance (m) give a derivative; and it shows this share of the least strength."""
@@ -132,14 +134,15 @@ def strongest(epoch: Date, distance: float) -> float:
     numbers, most = prepared(epoch), 0.0
     given: dict[str, Any] = {"cosines": numbers.cosines, "sines": numbers.sines}
     program = straight_line(equation, position=(0.0, 0.0, 0.0), **given)
+    rows = list[Any]()
     for latitude in np.linspace(-pi / 2.0, pi / 2.0, round(pi / GRID) + 1):
         across = distance * np.cos(latitude)
         longitude = np.linspace(0.0, 2.0 * pi, 1 + ceil(2.0 * pi * across / distance / GRID))
-        place: Any = (
-            across * np.cos(longitude),
-            across * np.sin(longitude),
-            np.full_like(longitude, distance * np.sin(latitude)),
-        )
+        height = np.full_like(longitude, distance * np.sin(latitude))
+        rows.append((across * np.cos(longitude), across * np.sin(longitude), height))
+    # Many places at once, as far as what is computed at them stays small.
+    for k in range(0, len(rows), PARALLELS):
+        place: Any = tuple(np.concatenate(rows[k : k + PARALLELS], axis=1))
         most = max(most, float(np.linalg.norm(evaluated(program, position=place, **given), axis=0).max()))
     # No place is as far from its nearest on the grid as three quarters of the grid's step.
     return most / cos((ROWS[-1][0] + 1) * 0.75 * GRID)

@@ -2,7 +2,7 @@
 evaluates such programs in floats."""
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -112,5 +112,10 @@ def evaluated(program: Mapping[str, Any], **given: Any) -> list[Any]:
     values = [read(name) for name in program["inputs"]]
     for operation, *operands in program["steps"]:
         constant = operation == "constant"
-        values.append(float(rational(operands[0])) if constant else READERS[operation](*(values[k] for k in operands)))
+        values.append(_float(operands[0]) if constant else READERS[operation](*(values[k] for k in operands)))
     return [values[k] for k in program["outputs"]]
+
+
+@lru_cache(1 << 16)
+def _float(text: str) -> float:
+    return float(rational(text))
