@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache, reduce
 from itertools import product
 from math import ceil, cos, factorial, inf, pi, radians, sqrt
@@ -126,14 +126,7 @@ def strongest(epoch: Date, distance: float) -> float:
     """
     import numpy as np
 
-    from starhold.trace.straight_line import evaluated, straight_line
-
-    def equation(position: Vector, cosines: Any, sines: Any) -> Vector:
-        return earth_fixed(position, numbers._replace(cosines=cosines, sines=sines))
-
-    numbers, most = prepared(epoch), 0.0
-    given: dict[str, Any] = {"cosines": numbers.cosines, "sines": numbers.sines}
-    program = straight_line(equation, position=(0.0, 0.0, 0.0), **given)
+    most, field_of = 0.0, _columns(epoch)
     rows = list[Any]()
     for latitude in np.linspace(-pi / 2.0, pi / 2.0, round(pi / GRID) + 1):
         across = distance * np.cos(latitude)
@@ -142,8 +135,8 @@ def strongest(epoch: Date, distance: float) -> float:
         rows.append((across * np.cos(longitude), across * np.sin(longitude), height))
     # Many places at once, as far as what is computed at them stays small.
     for k in range(0, len(rows), PARALLELS):
-        place: Any = tuple(np.concatenate(rows[k : k + PARALLELS], axis=1))
-        most = max(most, float(np.linalg.norm(evaluated(program, position=place, **given), axis=0).max()))
+        places = np.concatenate(rows[k : k + PARALLELS], axis=1)
+        most = max(most, float(np.linalg.norm(field_of(places), axis=0).max()))
     # No place is as far from its nearest on the grid as three quarters of the grid's step.
     return most / cos((ROWS[-1][0] + 1) * 0.75 * GRID)
 
@@ -177,17 +170,7 @@ def weakest(epoch: Date, nearest: float, farthest: float) -> float:
     are divided."""
     import numpy as np
 
-    from starhold.trace.straight_line import evaluated, straight_line
-
-    def equation(position: Vector, cosines: Any, sines: Any) -> Vector:
-        return earth_fixed(position, numbers._replace(cosines=cosines, sines=sines))
-
-    def at(places: Any) -> Any:
-        return np.array(evaluated(program, position=tuple(places), **given))
-
-    numbers = prepared(epoch)
-    given: dict[str, Any] = {"cosines": numbers.cosines, "sines": numbers.sines}
-    program = straight_line(equation, position=(0.0, 0.0, 0.0), **given)
+    at = _columns(epoch)
     half = np.array([(farthest - nearest) / 2.0, COARSE, COARSE])
     axes = [np.arange(-limit + COARSE, limit, 2.0 * COARSE) for limit in (pi / 2.0, pi)]
     cells = np.array([x.ravel() for x in np.meshgrid((nearest + farthest) / 2.0, *axes)])
@@ -217,6 +200,30 @@ def weakest(epoch: Date, nearest: float, farthest: float) -> float:
         corners = np.array([x for x in product((-1, 0, 1), repeat=3) if np.all((np.array(x) != 0) == parted)]).T
         cells = (cells[:, :, None] + (half[:, None] * corners)[:, None, :]).reshape(3, -1)
     return 0.0
+
+
+def _columns(epoch: Date) -> Callable[[Any], Any]:
+    """Return the field (T) as a function of many places (m), both in Earth-fixed axes, (3, n)."""
+    import numpy as np
+
+    from starhold.trace.straight_line import evaluated
+
+    numbers = prepared(epoch)
+    given: dict[str, Any] = {"cosines": numbers.cosines, "sines": numbers.sines}
+    return lambda places: np.array(evaluated(_recorded(), position=tuple(places), **given))
+
+
+@cache
+def _recorded() -> dict[str, Any]:
+    """Return the program of the field, which is the same at all epochs."""
+    from starhold.trace.straight_line import straight_line
+
+    numbers = prepared((2025.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+
+    def equation(position: Vector, cosines: Any, sines: Any) -> Vector:
+        return earth_fixed(position, numbers._replace(cosines=cosines, sines=sines))
+
+    return straight_line(equation, position=(0.0, 0.0, 0.0), cosines=numbers.cosines, sines=numbers.sines)
 
 
 def _known(epoch: Date) -> float:
