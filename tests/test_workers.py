@@ -18,11 +18,41 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     config.pluginmanager.register(workers)
 """
-FILES = {
-    "test_one.py": "import pytest\n\n\n@pytest.mark.parametrize('k', range(5))\ndef test_it(k):\n    print('said', k)\n    assert k != 3\n",
-    "test_two.py": "import pytest\n\n\ndef test_it(tmp_path):\n    (tmp_path / 'x').touch()\n\n\ndef test_left():\n    pytest.skip()\n",
-    "test_three.py": "import pytest\n\n\n@pytest.fixture\ndef broken():\n    raise OSError\n\n\ndef test_it(broken):\n    pass\n",
-}  # fmt: skip
+ONE = """
+import pytest
+
+
+@pytest.mark.parametrize("k", range(5))
+def test_it(k):
+    print("said", k)
+    assert k != 3
+"""
+TWO = """
+import pytest
+
+
+def test_it(tmp_path):
+    (tmp_path / "x").touch()
+
+
+def test_left():
+    pytest.skip()
+"""
+THREE = """
+import pytest
+
+
+@pytest.fixture
+def broken():
+    raise OSError
+
+
+def test_it(broken):
+    pass
+"""
+FILES = {"test_one.py": ONE, "test_two.py": TWO, "test_three.py": THREE}
+ENDS = {"test_ends.py": "import os\n\n\ndef test_it():\n    os._exit(0)\n\n\ndef test_after():\n    pass\n"}
+SLOW = {"test_slow.py": "import time\n\n\ndef test_it():\n    time.sleep(60)\n"}
 
 
 def told(folder, files, *words):
@@ -46,16 +76,13 @@ def test_all_are_run_and_told_as_by_one(count, tmp_path):
 
 
 def test_a_worker_that_ends_fails_the_test_it_ran_and_the_run(tmp_path):
-    ends = {"test_ends.py": "import os\n\n\ndef test_it():\n    os._exit(0)\n\n\ndef test_after():\n    pass\n"}
-    code, text = told(tmp_path, FILES | ends, "--workers=2")
+    code, text = told(tmp_path, FILES | ENDS, "--workers=2")
     assert code == 2
     assert "FAILED test_ends.py::test_it - the process that ran this test ended" in text
     assert "a worker ended before its last" in text
 
 
 def test_the_first_failure_ends_the_run_where_that_is_asked_for(tmp_path):
-    code, text = told(
-        tmp_path, FILES | {"test_slow.py": "import time\n\n\ndef test_it():\n    time.sleep(60)\n"}, "--workers=2", "-x"
-    )
+    code, text = told(tmp_path, FILES | SLOW, "--workers=2", "-x")
     assert code == 1
     assert "stopping after 1 failures" in text

@@ -74,7 +74,7 @@ def pytest_runtestloop(session):
         if not process:
             _work(session, longest, queue, end, base / f"worker{k}")
         os.close(end)
-        workers[open(pipe, "rb")] = process
+        workers[os.fdopen(pipe, "rb")] = process
     os.close(queue)
     try:
         _hear(session, workers)

@@ -270,8 +270,7 @@ def _changes(part: Part, loop: ClosedLoop, change: Push) -> Iterator[tuple[str, 
 
 
 def _follows_as_it_says(part: Part) -> None:
-    """An actuator's output, integrated in fine steps, comes nearer to a command that is held as `late` says, whatever it is
-    off by at first."""
+    """An actuator's output, in fine steps, comes nearer to a held command as `late` says, whatever it is off by at first."""
     module, random, steps = cast(Any, part.module), np.random.default_rng(4), 2000
     for params in part.examples():
         numbers, late = Fitted(part, params).prepared(PERIOD), module.late(params, PERIOD)
@@ -279,25 +278,22 @@ def _follows_as_it_says(part: Part) -> None:
         for _ in range(STEPS):
             target = random.normal(size=3)
             off = random.uniform(-1.0, 1.0, size=3) * min(late.most, 1.0) * 0.999
-            begun, wanted = cast(Vector, tuple((target + off).tolist())), cast(Vector, tuple(target.tolist()))
-            outputs = [begun]
+            *outputs, wanted = (cast(Vector, tuple(x.tolist())) for x in (target + off, target))
             for _ in range(steps):
-                rate = module.rates(outputs[-1], wanted, begun, PERIOD, numbers)
+                rate = module.rates(outputs[-1], wanted, outputs[0], PERIOD, numbers)
                 outputs.append(add(outputs[-1], scale(PERIOD / steps, rate)))
-            from_target = np.array(outputs) - target
-            sizes = np.linalg.norm(from_target, axis=1) / np.linalg.norm(off)
+            sizes = np.linalg.norm(np.array(outputs) - target, axis=1) / np.linalg.norm(off)
             between = (sizes[:-1] + sizes[1:]) / 2.0
-            mean, moment = float(between.mean()), float((between * (1.0 - (np.arange(steps) + 0.5) / steps)).mean())
+            mean, moment = (float((between * share).mean()) for share in (1.0, 1.0 - (np.arange(steps) + 0.5) / steps))
             require(bool(np.diff(sizes).max() < 1e-9), "it goes away from the command")
-            for name, size, most in (("mean", mean, late.mean), ("kept", float(sizes[-1]), late.kept)):
+            for name, size, most in (("mean", mean, late.mean), ("kept", sizes[-1], late.kept)):
                 require(size <= most + 1e-3, f"{name} is {size:g}, larger than {most:g}")
                 require(late.moment is None or size >= most - 1e-3, f"{name} is {size:g}, and not exactly {most:g}")
             if late.moment is None:
                 continue
-            exact = abs(moment - late.moment) <= 1e-3
-            require(exact, f"the mean by the time that is left is {moment:g}, and not {late.moment}")
-            straight = np.linalg.norm(np.cross(from_target[-1], off)) <= 1e-9 * float(off @ off)
-            require(bool(straight), "it comes nearer otherwise in each component")
+            require(abs(moment - late.moment) <= 1e-3, f"the mean by the time left is {moment:g}, and not {late.moment}")
+            aside = float(np.linalg.norm(np.cross(outputs[-1] - target, off)))
+            require(aside <= 1e-9 * float(off @ off), "it comes nearer otherwise in each component")
 
 
 def _moves_as_it_says(part: Part) -> None:
