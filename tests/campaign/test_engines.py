@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import psutil
@@ -51,7 +51,7 @@ class Faulty(Toy):
 
     how: str = ""
     since: int = 32
-    home: int = os.getpid()
+    home: int = field(default_factory=os.getpid)
 
     def fly(self, law, first, count):
         chunk = super().fly(law, first, count)
