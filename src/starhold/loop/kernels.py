@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partial
+from math import copysign
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -18,6 +19,7 @@ from starhold.algebra.structured import Buffer
 from starhold.loop.closed_loop import ClosedLoop, Composition, Phase
 from starhold.loop.step import Step, make_equations
 from starhold.parts.random import Dice, Silent
+from starhold.trace.handles import Opposite
 from starhold.trace.machine import load, word
 from starhold.trace.program import Program
 from starhold.trace.recording import Recorder
@@ -68,6 +70,7 @@ def _form(value: Any, known: dict[str, int]) -> Any:
     if isinstance(value, tuple):
         shared = _in_common(value)  # pyright: ignore
         equal = () if shared is None else (known.setdefault(shared, len(known)),)
+        equal += tuple(_sizes(getattr(value, name)) for name in getattr(value, "SIZES_IN_COMMON", ()))  # pyright: ignore
         # Most parts are numbers: a call for each would cost more than all else.
         parts = ["number" if type(part) is float else _form(part, known) for part in value]  # pyright: ignore
         return (type(value), *equal, *parts)  # pyright: ignore
@@ -83,6 +86,16 @@ def _in_common(value: tuple[Any, ...]) -> str | None:
     if not getattr(value, "IN_COMMON", False) or not all(isinstance(leaf, float) for leaf in leaves(value)):
         return None
     return repr(value)
+
+
+def _sizes(rows: Any) -> tuple[tuple[int, bool], ...]:
+    """Return for each number of some rows the place of the first of its size, and whether it has the other sign; () where
+    some differ between lanes."""
+    numbers, places = list(leaves(rows)), dict[float, int]()
+    if not all(type(number) is float for number in numbers):
+        return ()
+    firsts = [places.setdefault(abs(number), place) for place, number in enumerate(numbers)]
+    return tuple((k, copysign(1.0, x) != copysign(1.0, numbers[k])) for k, x in zip(firsts, numbers, strict=True))
 
 
 def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
@@ -123,6 +136,19 @@ class Arguments:
                 return Buffer(tables, offset - value.size, value.size)
             return value
 
+        def merged(rows: Any) -> Any:
+            """Return rows in which a number's opposite is one for the recorder too, and equal numbers are one."""
+            sizes, numbers = _sizes(rows), list[Any]()
+
+            def one(value: Any) -> Any:
+                numbers.append(leaf(value))
+                if not sizes:
+                    return numbers[-1]
+                first, turned = sizes[len(numbers) - 1]
+                return Opposite(numbers[first]) if turned else numbers[first]
+
+            return mapped(rows, one)
+
         met: dict[str, Any] = {}
 
         def part(value: Any) -> Any:
@@ -134,7 +160,8 @@ class Arguments:
                 for _ in leaves(value):
                     next(places["shared"])
                 return met[shared]
-            made = rebuild(value, [part(x) for x in value])  # pyright: ignore
+            sized = [getattr(value, name) for name in getattr(value, "SIZES_IN_COMMON", ())]  # pyright: ignore
+            made = rebuild(value, [merged(x) if any(x is y for y in sized) else part(x) for x in value])  # pyright: ignore
             if shared is not None:
                 met[shared] = made
             return made

@@ -60,7 +60,17 @@ def constant(vector: Vector) -> Vector:
 
 def cosines(normals: Sequence[Vector], direction: Vector) -> tuple[Scalar, ...]:
     """Return the cosines of the angles between normals and a direction, 0 for plates facing away."""
-    return tuple(maximum(_sum(normal, direction), 0.0) for normal in normals)
+    along, seen = [_sum(normal, direction) for normal in normals], list[Scalar]()
+    for number, normal in enumerate(normals):
+        # Of the two sides of a box at most one is seen: max(-x, 0) is max(x, 0) - x, without rounding.
+        other = next((k for k in range(number) if _opposite(normals[k], normal)), None)
+        seen.append(maximum(along[number], 0.0) if other is None else seen[other] - along[other])
+    return tuple(seen)
+
+
+def _opposite(one: Vector, other: Vector) -> bool:
+    """Return whether two constant normals are opposite; those that are numbers of a flight are not compared."""
+    return all(isinstance(a, int) and isinstance(b, int) and a == -b for a, b in zip(one, other, strict=True))
 
 
 def total(weights: Sequence[Scalar], arms: Sequence[Vector]) -> Vector:
