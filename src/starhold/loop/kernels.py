@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partial
+from itertools import repeat
 from math import copysign
 from typing import Any, NamedTuple, TypeAlias
 
@@ -89,12 +90,12 @@ def _in_common(value: tuple[Any, ...]) -> str | None:
 
 
 def _sizes(rows: Any) -> tuple[tuple[int, bool], ...]:
-    """Return for each number of some rows the place of the first of its size, and whether it has the other sign; () where
-    some differ between lanes."""
-    numbers, places = list(leaves(rows)), dict[float, int]()
-    if not all(type(number) is float for number in numbers):
+    """Return for each number of some rows, besides constants, the place of the first of its size, and whether it has the
+    other sign; () where some differ between lanes."""
+    numbers, places = [x for x in leaves(rows) if not isinstance(x, int)], dict[float, int]()
+    if any(isinstance(x, np.ndarray) for x in numbers):
         return ()
-    firsts = [places.setdefault(abs(number), place) for place, number in enumerate(numbers)]
+    firsts = [places.setdefault(abs(x), place) for place, x in enumerate(numbers)]
     return tuple((k, copysign(1.0, x) != copysign(1.0, numbers[k])) for k, x in zip(firsts, numbers, strict=True))
 
 
@@ -137,13 +138,13 @@ class Arguments:
             return value
 
         def merged(rows: Any) -> Any:
-            """Return rows in which a number's opposite is one for the recorder too, and equal numbers are one."""
+            """Return rows in which equal numbers are one number, and opposite ones are opposites of it."""
             sizes, numbers = _sizes(rows), list[Any]()
 
             def one(value: Any) -> Any:
+                if not sizes or isinstance(value, int):
+                    return leaf(value)
                 numbers.append(leaf(value))
-                if not sizes:
-                    return numbers[-1]
                 first, turned = sizes[len(numbers) - 1]
                 return Opposite(numbers[first]) if turned else numbers[first]
 
@@ -160,8 +161,8 @@ class Arguments:
                 for _ in leaves(value):
                     next(places["shared"])
                 return met[shared]
-            sized = [getattr(value, name) for name in getattr(value, "SIZES_IN_COMMON", ())]  # pyright: ignore
-            made = rebuild(value, [merged(x) if any(x is y for y in sized) else part(x) for x in value])  # pyright: ignore
+            fields, sized = getattr(value, "_fields", repeat("")), getattr(value, "SIZES_IN_COMMON", ())  # pyright: ignore
+            made = rebuild(value, [merged(x) if name in sized else part(x) for name, x in zip(fields, value)])  # pyright: ignore
             if shared is not None:
                 met[shared] = made
             return made

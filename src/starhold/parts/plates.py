@@ -73,10 +73,38 @@ def _opposite(one: Vector, other: Vector) -> bool:
     return all(isinstance(a, int) and isinstance(b, int) and a == -b for a, b in zip(one, other, strict=True))
 
 
-def total(weights: Sequence[Scalar], arms: Sequence[Vector]) -> Vector:
-    """Return the sum of weights[i] * arms[i], from the first to the last."""
-    x, y, z = (_sum(column, weights) for column in zip(*arms, strict=True))
+def total(weights: Sequence[Scalar], arms: Sequence[Vector], normals: Sequence[Vector]) -> Vector:
+    """Return the sum of weights[i] * arms[i], from the first to the last; the weights are cosines of the normals, or their
+    squares."""
+    x, y, z = (_sum(*_joined(column, weights, normals)) for column in zip(*arms, strict=True))
     return (x, y, z)
+
+
+def _joined(
+    column: Sequence[Scalar], weights: Sequence[Scalar], normals: Sequence[Vector]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Return factors and weights, joined for two sides of a box in a row whose factors are equal or opposite: one of their
+    weights is zero, so one product is the sum of both, without rounding."""
+    factors, numbers, place = list[Scalar](), list[Scalar](), 0
+    while place < len(column):
+        factor, number = column[place], weights[place]
+        place += 1
+        if place < len(column) and _opposite(normals[place - 1], normals[place]):
+            sign = _ratio(factor, column[place])
+            if sign:
+                number = number + weights[place] if sign > 0 else number - weights[place]
+                place += 1
+        factors.append(factor)
+        numbers.append(number)
+    return factors, numbers
+
+
+def _ratio(one: Scalar, other: Scalar) -> int:
+    """Return 1 for equal numbers, -1 for opposite ones, 0 if they are neither, or not known to be, or constants."""
+    if isinstance(one, int) or isinstance(other, int):
+        return 0
+    plain = isinstance(one, float) and isinstance(other, float)
+    return 1 if one is other or (plain and one == other) else -1 if one is (turned := -other) or (plain and one == turned) else 0
 
 
 def _sum(factors: Sequence[Scalar], numbers: Sequence[Scalar]) -> Scalar:
