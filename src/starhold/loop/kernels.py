@@ -161,8 +161,9 @@ class Arguments:
                 for _ in leaves(value):
                     next(places["shared"])
                 return met[shared]
-            fields, sized = getattr(value, "_fields", repeat("")), getattr(value, "SIZES_IN_COMMON", ())  # pyright: ignore
-            made = rebuild(value, [merged(x) if name in sized else part(x) for name, x in zip(fields, value)])  # pyright: ignore
+            sized = getattr(value, "SIZES_IN_COMMON", ())  # pyright: ignore
+            named = zip(getattr(value, "_fields", repeat("")), value, strict=False)  # pyright: ignore
+            made = rebuild(value, [merged(x) if name in sized else part(x) for name, x in named])  # pyright: ignore
             if shared is not None:
                 met[shared] = made
             return made

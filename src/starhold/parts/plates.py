@@ -99,12 +99,15 @@ def _joined(
     return factors, numbers
 
 
-def _ratio(one: Scalar, other: Scalar) -> int:
+def _ratio(one: Any, other: Any) -> int:
     """Return 1 for equal numbers, -1 for opposite ones, 0 if they are neither, or not known to be, or constants."""
     if isinstance(one, int) or isinstance(other, int):
         return 0
-    plain = isinstance(one, float) and isinstance(other, float)
-    return 1 if one is other or (plain and one == other) else -1 if one is (turned := -other) or (plain and one == turned) else 0
+    for sign, like in ((1, other), (-1, -other)):
+        # Numbers of a kernel cannot be compared: it has made those that are alike one.
+        if one is like or (isinstance(one, float) and isinstance(like, float) and one == like):
+            return sign
+    return 0
 
 
 def _sum(factors: Sequence[Scalar], numbers: Sequence[Scalar]) -> Scalar:

@@ -92,8 +92,7 @@ class Wheels(NamedTuple):
     """The axes that laws and allocation assume for misaligned wheels; () for aligned wheels."""
 
     SIZES_IN_COMMON = ("axes",)  # pyright: ignore
-    """Kernels merge numbers of these fields that differ in sign alone: each wheel of a pyramid has one size about all axes,
-    so one product of it and a torque serves all three."""
+    """Kernels merge numbers of these fields that differ in sign alone: a pyramid's wheel needs one product for all axes."""
 
 
 Params = Wheels

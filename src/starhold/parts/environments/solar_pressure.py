@@ -133,7 +133,8 @@ def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> V
         return None
     toward, seen, squares = _seen(state, params, memory)
     taken, mirrored, scattered = params.push
-    push = add(scale(sum(map(mul, taken, seen)), toward), total((*squares, *seen), (*mirrored, *scattered), 2 * params.normals))
+    along = total((*squares, *seen), (*mirrored, *scattered), 2 * params.normals)
+    push = add(scale(sum(map(mul, taken, seen)), toward), along)
     return to_reference(state.attitude, scale(-memory.pressure, push))
 
 
