@@ -6,7 +6,7 @@ from starhold.conformance.bench import CRAFT
 from starhold.parts import sun
 from starhold.parts.contract import Envelope
 from starhold.parts.environments import drag, solar_pressure
-from starhold.parts.plates import BOX
+from starhold.parts.plates import BOX, cosines, plates_of, total
 from starhold.parts.sun import EARTH
 from tests.oracles.basilisk import need, simulation
 from tests.parts.fields import states
@@ -40,6 +40,19 @@ def in_basilisk(effector, state):
     _running, run_to = simulation(1e-6, craft, effector)
     run_to(2e-6)
     return np.array(effector.torqueExternalPntB_B).ravel()
+
+
+def test_two_sides_of_a_box_share_products_without_rounding():
+    rows = (*BOX, (0.05, 0.6, 0.0, -0.8, 0.1, -0.2, 0.3))
+    _, normals, centres = plates_of(rows)
+    for direction in [*np.random.default_rng(3).normal(size=(200, 3)).tolist(), [0.0, -1.0, 0.0]]:
+        along = [float(np.array([n * d for n, d in zip(normal, direction, strict=True)]).sum()) for normal in normals]
+        seen = cosines(normals, direction)
+        assert seen[:6] == tuple(max(x, 0.0) for x in along[:6])
+        one_by_one = [0.0, 0.0, 0.0]
+        for weight, centre in zip(seen, centres, strict=True):
+            one_by_one = [x + weight * c for x, c in zip(one_by_one, centre, strict=True)]
+        assert total(seen, centres, normals) == tuple(one_by_one)
 
 
 def test_drag_against_basilisk():

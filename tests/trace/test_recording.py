@@ -14,7 +14,7 @@ from starhold.algebra.scalar import both, either, less, sqrt, where
 from starhold.algebra.structured import Buffer, at, function, repeat, unless, until, when
 from starhold.algebra.words import word_add, word_xor
 from starhold.errors import InputError
-from starhold.trace.handles import RecordingError
+from starhold.trace.handles import Opposite, RecordingError
 from starhold.trace.program import Branch, Call, Load, Loop, Op, Program, Store, single_turns, statements
 from starhold.trace.recording import RESERVED, Recorder
 
@@ -42,6 +42,24 @@ def operations(program: Program, function_name: str = "run") -> list[str]:
 
 
 # Sharing.
+
+
+def test_a_number_and_its_opposite_share_their_products() -> None:
+    def equation(cells, table, *_):
+        a, x, y = table[0], cells[0], cells[1]
+        turned: Any = Opposite(a)
+        cells[2] = (x * a + x * turned) - turned * y
+        cells[3] = turned + (y + -turned)
+
+    assert operations(record(equation)) == ["product", "minus", "product", "plus", "plus", "minus"]
+
+
+def test_an_opposite_that_is_alone_is_a_negative() -> None:
+    def equation(cells, table, *_):
+        turned: Any = Opposite(table[0]) * cells[0]
+        cells[1], cells[2] = turned, 1.0 / turned
+
+    assert operations(record(equation)) == ["product", "negative", "divide"]
 
 
 def test_equal_operations_are_recorded_once() -> None:

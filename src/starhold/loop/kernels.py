@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partial
+from itertools import repeat
+from math import copysign
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -18,6 +20,7 @@ from starhold.algebra.structured import Buffer
 from starhold.loop.closed_loop import ClosedLoop, Composition, Phase
 from starhold.loop.step import Step, make_equations
 from starhold.parts.random import Dice, Silent
+from starhold.trace.handles import Opposite
 from starhold.trace.machine import load, word
 from starhold.trace.program import Program
 from starhold.trace.recording import Recorder
@@ -68,6 +71,7 @@ def _form(value: Any, known: dict[str, int]) -> Any:
     if isinstance(value, tuple):
         shared = _in_common(value)  # pyright: ignore
         equal = () if shared is None else (known.setdefault(shared, len(known)),)
+        equal += tuple(_sizes(getattr(value, name)) for name in getattr(value, "SIZES_IN_COMMON", ()))  # pyright: ignore
         # Most parts are numbers: a call for each would cost more than all else.
         parts = ["number" if type(part) is float else _form(part, known) for part in value]  # pyright: ignore
         return (type(value), *equal, *parts)  # pyright: ignore
@@ -83,6 +87,16 @@ def _in_common(value: tuple[Any, ...]) -> str | None:
     if not getattr(value, "IN_COMMON", False) or not all(isinstance(leaf, float) for leaf in leaves(value)):
         return None
     return repr(value)
+
+
+def _sizes(rows: Any) -> tuple[tuple[int, bool], ...]:
+    """Return for each number of some rows, besides constants, the place of the first of its size, and whether it has the
+    other sign; () where some differ between lanes."""
+    numbers, places = [x for x in leaves(rows) if not isinstance(x, int)], dict[float, int]()
+    if any(isinstance(x, np.ndarray) for x in numbers):
+        return ()
+    firsts = [places.setdefault(abs(x), place) for place, x in enumerate(numbers)]
+    return tuple((k, copysign(1.0, x) != copysign(1.0, numbers[k])) for k, x in zip(firsts, numbers, strict=True))
 
 
 def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
@@ -123,6 +137,19 @@ class Arguments:
                 return Buffer(tables, offset - value.size, value.size)
             return value
 
+        def merged(rows: Any) -> Any:
+            """Return rows in which equal numbers are one number, and opposite ones are opposites of it."""
+            sizes, numbers = _sizes(rows), list[Any]()
+
+            def one(value: Any) -> Any:
+                if not sizes or isinstance(value, int):
+                    return leaf(value)
+                numbers.append(leaf(value))
+                first, turned = sizes[len(numbers) - 1]
+                return Opposite(numbers[first]) if turned else numbers[first]
+
+            return mapped(rows, one)
+
         met: dict[str, Any] = {}
 
         def part(value: Any) -> Any:
@@ -134,7 +161,9 @@ class Arguments:
                 for _ in leaves(value):
                     next(places["shared"])
                 return met[shared]
-            made = rebuild(value, [part(x) for x in value])  # pyright: ignore
+            sized = getattr(value, "SIZES_IN_COMMON", ())  # pyright: ignore
+            named = zip(getattr(value, "_fields", repeat("")), value, strict=False)  # pyright: ignore
+            made = rebuild(value, [merged(x) if name in sized else part(x) for name, x in named])  # pyright: ignore
             if shared is not None:
                 met[shared] = made
             return made

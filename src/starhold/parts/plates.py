@@ -60,13 +60,54 @@ def constant(vector: Vector) -> Vector:
 
 def cosines(normals: Sequence[Vector], direction: Vector) -> tuple[Scalar, ...]:
     """Return the cosines of the angles between normals and a direction, 0 for plates facing away."""
-    return tuple(maximum(_sum(normal, direction), 0.0) for normal in normals)
+    along, seen = [_sum(normal, direction) for normal in normals], list[Scalar]()
+    for number, normal in enumerate(normals):
+        # Of the two sides of a box at most one is seen: max(-x, 0) is max(x, 0) - x, without rounding.
+        other = next((k for k in range(number) if _opposite(normals[k], normal)), None)
+        seen.append(maximum(along[number], 0.0) if other is None else seen[other] - along[other])
+    return tuple(seen)
 
 
-def total(weights: Sequence[Scalar], arms: Sequence[Vector]) -> Vector:
-    """Return the sum of weights[i] * arms[i], from the first to the last."""
-    x, y, z = (_sum(column, weights) for column in zip(*arms, strict=True))
+def _opposite(one: Vector, other: Vector) -> bool:
+    """Return whether two constant normals are opposite; those that are numbers of a flight are not compared."""
+    return all(isinstance(a, int) and isinstance(b, int) and a == -b for a, b in zip(one, other, strict=True))
+
+
+def total(weights: Sequence[Scalar], arms: Sequence[Vector], normals: Sequence[Vector]) -> Vector:
+    """Return the sum of weights[i] * arms[i], from the first to the last; the weights are cosines of the normals, or their
+    squares."""
+    x, y, z = (_sum(*_joined(column, weights, normals)) for column in zip(*arms, strict=True))
     return (x, y, z)
+
+
+def _joined(
+    column: Sequence[Scalar], weights: Sequence[Scalar], normals: Sequence[Vector]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Return factors and weights, joined for two sides of a box in a row whose factors are equal or opposite: one of their
+    weights is zero, so one product is the sum of both, without rounding."""
+    factors, numbers, place = list[Scalar](), list[Scalar](), 0
+    while place < len(column):
+        factor, number = column[place], weights[place]
+        place += 1
+        if place < len(column) and _opposite(normals[place - 1], normals[place]):
+            sign = _ratio(factor, column[place])
+            if sign:
+                number = number + weights[place] if sign > 0 else number - weights[place]
+                place += 1
+        factors.append(factor)
+        numbers.append(number)
+    return factors, numbers
+
+
+def _ratio(one: Any, other: Any) -> int:
+    """Return 1 for equal numbers, -1 for opposite ones, 0 if they are neither, or not known to be, or constants."""
+    if isinstance(one, int) or isinstance(other, int):
+        return 0
+    for sign, like in ((1, other), (-1, -other)):
+        # Numbers of a kernel cannot be compared: it has made those that are alike one.
+        if one is like or (isinstance(one, float) and isinstance(like, float) and one == like):
+            return sign
+    return 0
 
 
 def _sum(factors: Sequence[Scalar], numbers: Sequence[Scalar]) -> Scalar:

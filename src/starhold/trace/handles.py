@@ -123,6 +123,34 @@ class Number(Handle):
         return self
 
 
+class Opposite(Number):
+    """A handle that stands for -x of a number x: the signs of its products and sums follow without an operation, and without
+    rounding, so that a product with x serves for both."""
+
+    __slots__ = ("other",)
+
+    def __init__(self, other: Number) -> None:
+        super().__init__(other.recorder, (-other).ref)
+        self.other = other
+
+    def __mul__(self, factor: Any) -> Any:
+        return Opposite(self.other * factor)
+
+    def __rmul__(self, factor: Any) -> Any:
+        return Opposite(factor * self.other)
+
+    def __add__(self, term: Any) -> Any:
+        return term - self.other
+
+    __radd__ = __add__
+
+    def __rsub__(self, term: Any) -> Any:
+        return term + self.other
+
+    def __neg__(self) -> Any:
+        return self.other
+
+
 class Truth(Handle):
     """A handle that stands for the result of a comparison."""
 

@@ -91,6 +91,9 @@ class Wheels(NamedTuple):
     known_axes: Rows = ()
     """The axes that laws and allocation assume for misaligned wheels; () for aligned wheels."""
 
+    SIZES_IN_COMMON = ("axes",)  # pyright: ignore
+    """Kernels merge numbers of these fields that differ in sign alone: a pyramid's wheel needs one product for all axes."""
+
 
 Params = Wheels
 
@@ -268,8 +271,10 @@ def _braked(
 
 def _room(command: Scalar, momentum: Scalar, limit: Scalar) -> Scalar:
     """Return the share of its torque that a motor has at this momentum in the direction of the command."""
-    filled = momentum * (1.0 / limit)
-    return _fraction((1.0 - where(less(0.0, command), filled, -filled)) * (1.0 / BAND))
+    # The sign goes to the constant: the product is the same, and a held command decides on it once for all stages.
+    inverse = 1.0 / limit
+    filled = momentum * where(less(0.0, command), inverse, -inverse)
+    return _fraction((1.0 - filled) * (1.0 / BAND))
 
 
 def available(command: Numbers, momentum: Numbers, wheels: Wheels) -> Numbers:
@@ -285,7 +290,9 @@ def _available(command: Scalar, momentum: Scalar, torque_limit: Scalar, momentum
 
 
 def _fraction(x: Scalar) -> Scalar:
-    return where(less(x, 0.0), 0.0, where(less(x, 1.0), x, 1.0))
+    # A minimum and a maximum, each one instruction.
+    most = where(less(x, 1.0), x, 1.0)
+    return where(less(most, 0.0), 0.0, most)
 
 
 def on_body(momentum_rate: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Vector:

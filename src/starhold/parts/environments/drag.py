@@ -88,6 +88,8 @@ class Numbers(NamedTuple):
     bends: Buffer | tuple[()] = ()
     areas: tuple[Scalar, ...] = ()
 
+    SIZES_IN_COMMON = ("arms",)  # pyright: ignore
+
 
 class Memory(NamedTuple):
     """The direction of motion relative to the air (unit vector, inertial axes), and the dynamic pressure (N/m2)."""
@@ -186,7 +188,7 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     course = to_body(state.attitude, memory.course)
     # All forces point against the velocity relative to the air.
     shown = cosines(params.normals, course)
-    return scale(params.coefficient * memory.pressure, cross(course, total(shown, params.arms)))
+    return scale(params.coefficient * memory.pressure, cross(course, total(shown, params.arms, params.normals)))
 
 
 def bound(params: Params, envelope: Envelope) -> Push:

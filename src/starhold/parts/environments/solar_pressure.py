@@ -73,6 +73,8 @@ class Numbers(NamedTuple):
     period: Scalar
     push: tuple[Any, ...] = ()
 
+    SIZES_IN_COMMON = ("taken", "mirrored", "scattered")  # pyright: ignore
+
 
 class Memory(NamedTuple):
     """The direction to the Sun (unit vector, inertial axes), and the pressure of its light (N/m2)."""
@@ -131,7 +133,8 @@ def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> V
         return None
     toward, seen, squares = _seen(state, params, memory)
     taken, mirrored, scattered = params.push
-    push = add(scale(sum(map(mul, taken, seen)), toward), total((*squares, *seen), (*mirrored, *scattered)))
+    along = total((*squares, *seen), (*mirrored, *scattered), 2 * params.normals)
+    push = add(scale(sum(map(mul, taken, seen)), toward), along)
     return to_reference(state.attitude, scale(-memory.pressure, push))
 
 
@@ -140,8 +143,8 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
 
     def pushed(_: Vector) -> tuple[Vector]:
         toward, seen, squares = _seen(state, params, memory)
-        along = total((*squares, *seen), (*params.mirrored, *params.scattered))
-        return (scale(-memory.pressure, add(cross(total(seen, params.taken), toward), along)),)
+        along = total((*squares, *seen), (*params.mirrored, *params.scattered), 2 * params.normals)
+        return (scale(-memory.pressure, add(cross(total(seen, params.taken, params.normals), toward), along)),)
 
     # A third of many orbits lies in the Earth's shadow.
     (torque,) = when(less(0.0, memory.pressure), pushed, ZERO)
