@@ -50,6 +50,7 @@ class Chain:
     state: float = 0.0
     held: float = 0.0
     rest: float = 0.0
+    place: int = 0
     law: float = 0.0
     law_rest: float = 0.0
     told: dict = field(default_factory=dict)
@@ -73,7 +74,7 @@ class Chain:
         made.numbers = {name: Fraction(x) for name, x in self.numbers.items()}
         made.A, made.B, made.K = map(exactly, (self.A, self.B, self.K))
         made.take(exactly(self.W), self.blocks)
-        rest, law_rest = exact(only(self.rest)), exact(only(self.law_rest, count=3))
+        rest, law_rest = exact(only(self.rest, self.place)), exact(only(self.law_rest, count=3))
         left = Left(*map(exactly, (self.D, self.T)), rest, exactly(self.U), law_rest)
         made.left = lambda box: left
         return made
@@ -116,7 +117,7 @@ class Chain:
 
     @property
     def driven(self):
-        return (self.B + self.T) @ self.torques[1] + only(self.rest)[:, None]
+        return (self.B + self.T) @ self.torques[1] + only(self.rest, self.place)[:, None]
 
     def rates(self, z):
         """z' of states."""
@@ -125,7 +126,7 @@ class Chain:
     @property
     def wrong(self):
         """The torque that is held besides that which is linear in the state at the sample, and its bound."""
-        radii, box, period = self.bounds
+        radii, _, period = self.bounds
         most = period.error + appended.norm(combined(image(period.law, radii), period.law_rest))
         return self.torques[1] - self.most("outside") * FIRST + self.K @ self.begun, most
 
@@ -195,6 +196,7 @@ SERIES = {
     "samples": ({"radii": THIRD}, {"FINE": 1}),
     "samples of a block": ({"radii": DISK}, {"FINE": 1}),
     "rest": ({"rest": SMALL}, {"FINE": 1}),
+    "rest beside a block": ({"rest": SMALL, "place": 1}, {"FINE": 1}),
     "outside": ({"told": {"outside": SMALL}}, {"FINE": 1}),
     "error": ({"told": {"error": SMALL}}, {"FINE": 1}),
     # Terms that are rounded to nothing.
@@ -249,6 +251,19 @@ def test_a_curve_is_away_from_its_middle_by_what_is_said():
     bent = np.array(chain.motion.bent, dtype=float)
     assert (away <= bent).all()
     assert (away >= 0.99 * bent)[3:].all()
+
+
+@pytest.mark.parametrize(("fine", "rate"), [(1, 0.02), (20, 0.02), (2**14, 0.6)])
+def test_what_series_leave_out_of_a_curve_is_in_the_bound(fine, rate, monkeypatch):
+    """Of the value at the end, and of the second derivative."""
+    monkeypatch.setattr(appended, "FINE", fine)
+    chain = Chain(chain=rate)
+    motion, end = chain.motion, expm(chain.A * H) @ chain.B
+    last, middle = (np.array(way, dtype=float) for way in motion.ways[1:3])
+    away = np.linalg.norm(H / 2 * end - last, axis=1)
+    away += np.linalg.norm(H**3 / 12 * chain.A @ chain.A @ end - middle, axis=1)
+
+    assert (away <= np.array(motion.bent, dtype=float)).all()
 
 
 @pytest.mark.parametrize("blocks", [[1] * N, [2, 1, 2, 2]])
@@ -332,8 +347,9 @@ def response(chain, none=False):
 
 LATER = {
     "samples": {"radii": only(SMALL, 1, N - 1)},
-    **{name: ALONE[name] for name in ("rest", "rest of the law", "outside", "error", "misread rate", "law of what is misread")},
 }
+for name in ("rest", "rest of the law", "outside", "error", "misread rate", "law of what is misread"):
+    LATER[name] = ALONE[name]
 
 
 @pytest.mark.parametrize("case", LATER)
