@@ -158,7 +158,7 @@ class Chain:
         bounds["hurried"] = [float(self.motion.hurried(period, box, radii, most_wrong))], [hurry]
         bounds["wrong"] = [float(most_wrong)], [np.linalg.norm(wrong, axis=0)]
         return {
-            name: [np.abs(x).max() / y for x, y in zip(reached, most, strict=True) if y > 1e-12]
+            name: [used / max(y, 1e-30) for used, y in zip(map(np.max, np.abs(reached)), most, strict=True) if used > 1e-12]
             for name, (most, reached) in bounds.items()
         }
 
@@ -173,6 +173,8 @@ ALONE = {
     "rest": {"rest": SMALL},
     "in proportion to the state": {"radii": DISK, "state": 0.1, "chain": 0.1},
     "in proportion to the torque": {"radii": DISK, "rate": 1.0, "torque": 1e-9, "held": 1.0, "chain": 0.1},
+    "in proportion to what is pushed": {"told": {"outside": SMALL}, "state": 0.1, "chain": 0.1},
+    "in proportion to what pushes": {"told": {"outside": SMALL}, "torque": 1e-9, "held": 1.0, "chain": 0.1},
     "law": {"radii": DISK, "law": 1.0, "chain": 0.1},
     "rest of the law": {"law_rest": SMALL},
     "outside": {"told": {"outside": SMALL}},
