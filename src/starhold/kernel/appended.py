@@ -189,9 +189,9 @@ class Appended:
         whole_period, self.linear = held_torque, short(sized(times(W, end), blocks, blocks))
         self.held_torque = short(sized(times(W, held_torque), blocks, axes))
         self.spans, self.given, self.feedback = short(spans), short(given), short(sized(KV, axes, blocks))
-        rest = self.tail * max(map(norm, self.B))
-        self.nudged, self.struck = combined(nudged, [rest] * self.n), combined(struck, [rest * x for x in self.widths])
-        rest *= a / 2 + Fraction((terms + 2) * (terms + 1) * terms, 12)
+        # What the series leave out of the motion itself is in `unseries`, for external torques too.
+        self.nudged, self.struck = nudged, struck
+        rest = self.tail * max(map(norm, self.B)) * (a / 2 + Fraction((terms + 2) * (terms + 1) * terms, 12))
         self.bent, self.hurry = combined(bent, [rest] * self.n), short(hurry)
         final = plus(self.B, times(A, whole_period))
         ends = ([[h / 2 * x for x in row] for row in rows] for rows in (self.B, final))

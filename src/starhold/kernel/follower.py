@@ -7,20 +7,24 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
+from .loops import AXES
 from .near import Near
 from .numbers import Rows, added, beside, demand, norm, plus, reach, root, scalar, times, transpose, up
 from .polynomials import Poly, apply, minus, most, var
 from .reader import Reader
 from .reading import Numbers
 from .regions import (
+    AMISS,
     ANGLE,
     AT_REST,
+    PULL,
     RATE,
     SPEED,
     STATE,
     TURN,
     Behind,
     Radii,
+    Region,
     Sizes,
     Tube,
     felt,
@@ -115,6 +119,9 @@ class Follower(Reader):
     heeded: list[Poly]
     beside: list[Poly]
     leaning: list[Poly]
+    odd: list[Poly]
+    rigid: dict[str, list[Poly]]
+    last_asked: tuple[Rows | None, Sizes, tuple[Sizes, list[Fraction], Fraction] | None] = None, {}, None
     apart: Radii
     swayed: Radii
     leant: Radii
@@ -171,6 +178,24 @@ class Follower(Reader):
     def of_level(self, c: Fraction) -> Sizes:
         """Return bounds of the torque's error where V + weight a^2 is at most c."""
         return {FIRST: root(up(c / self.late.weight)), REST: self.late.rest} if self.late else {}
+
+    def asked(self, region: Region) -> tuple[Sizes, list[Fraction], Fraction]:
+        """Return bounds of the acceleration that is commanded, of that at the sample, and of the torque due to external
+        quantities, if what is told is true. They do not depend on errors, which are bounded again and again in a region."""
+        sizes = {name: x for name, x in region.sizes.items() if name not in (FIRST, REST, *AMISS)}
+        near = sizes | {"v": 1 - region.least}
+        X, of, found = self.last_asked
+        if found is None or X is not region.X or of != near:
+            # In an ellipsoid c.x is at most the root of c.Xc.
+            even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
+            even = [min(x, sizes.get(PULL, x)) for x in even]
+            odd = [most(p, near) for p in self.odd]
+            asks = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
+            pulled = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
+            rigid = sum((felt(parts, x, sizes) * self.size(x) for x, parts in self.rigid.items()), ZERO)
+            found = asks, pulled, rigid
+            self.last_asked = region.X, near, found
+        return found
 
     def behind(self, sizes: Sizes, rest: bool = False) -> Behind:
         """Return bounds of the late torque's error, or of its part b alone."""

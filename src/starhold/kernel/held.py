@@ -17,13 +17,12 @@ from .loops import AXES, NONE, AttitudeLoop
 from .near import CHANGE, MOMENTA, between, form_of, near_target
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .plans import PLANNED, Plan
-from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
+from .polynomials import Poly, apply, cross, dot, fastest, largest, minus, most, total, var, variables
 from .regions import (
     AMISS,
     ANGLE,
     AT_REST,
     LOAD,
-    PULL,
     RATE,
     SPEED,
     STATE,
@@ -115,6 +114,7 @@ class Held(Follower):
         self.gyroscopic = [-p - q for p, q in zip(free, turning, strict=True)]
         self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
         self.bend = apply(self.N, self.gyroscopic)
+        self.bent = [[p.slope(name) for name in STATE[RATE]] for p in self.bend]
         self.rate = loop.slopes_along(V, self.accelerated)
         commanded_rates = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
         # The law's torque minus its linear part near the target.
@@ -218,14 +218,7 @@ class Held(Follower):
         """Return a set that motions from a region do not leave for a period. amiss: additional errors of measured attitude
         and rate due to the motion, by default slightly more than after a motion that did not leave the tube."""
         sizes = region.sizes
-        near = sizes | {"v": 1 - region.least}
-        # In an ellipsoid c.x is at most the root of c.Xc.
-        even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
-        even = [min(x, sizes.get(PULL, x)) for x in even]
-        odd = [most(p, near) for p in self.odd]
-        asks = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
-        pulled = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
-        rigid = sum((felt(within_tube, x, sizes) * self.size(x) for x, within_tube in self.rigid.items()), Fraction(0))
+        asks, pulled, rigid = self.asked(region)
         rigid, late = rigid + self.lasting, self.behind(sizes)
 
         def within(bounds: list[Fraction]) -> Sizes:
@@ -246,7 +239,7 @@ class Held(Follower):
             steady = (read if bound else misread(bounds))[1][0]
             stale = self.stale(within_tube, self.beside)
             push = steady + self.pushed(within_tube)["both"] + stale + late.mean
-            slopes = [[most(p.slope(name), within_tube) for name in STATE[RATE]] for p in self.bend]
+            slopes = largest(self.bent, within_tube)
             columns = zip(pulled, reach(slopes, beyond(wide, sizes)), self.widths, strict=True)
             faster = [u + more + push * n for u, more, n in columns]
             wide = [sizes[x] + self.h * more for x, more in zip(STATE[RATE], faster, strict=True)]
@@ -262,7 +255,7 @@ class Held(Follower):
         demand(not self.even or region.least > turned, "motions pass a half turn")
         demand(not self.grows or turned + self.h / 2 * self.size("r") < 1, "the body turns too far in a period")
         pushed, stale = self.pushed(far)["both"], self.stale(far, self.beside)
-        bent = [[most(p.slope(name), far) for name in STATE[RATE]] for p in self.bend]
+        bent = largest(self.bent, far)
         end = beyond(wide, sizes)
         drift = [x + self.h * (late.moved - late.mean) * n for x, n in zip(end, self.widths, strict=True)]
         return Tube(region, far, drift, turned, steady, pushed, stale, uneven, bent, late, end)
@@ -287,7 +280,7 @@ class Held(Follower):
         moved = [*tube.drift, *[tube.turned] * 3, *[h * tube.sizes[SPEED] * self.size("h")] * 3]
         # The effect on V of changes of momentum, which is smaller than that of their torques on the body.
         still, worse = self.unlike_body(tube.sizes, self.worked)
-        curved = {name: [most(p, tube.sizes) for p in self.curvature[name]] for name in STATE[RATE]}
+        curved = dict(zip(self.curvature, largest([*self.curvature.values()], tube.sizes), strict=True))
         steep = {
             name: most(p, near) + reach([curved[name]], [tube.turned, *moved])[0]
             for name, p in zip(curved, self.steep, strict=True)

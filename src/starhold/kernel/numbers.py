@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from math import factorial, gcd, isqrt, lcm
 from operator import mul
 from typing import Any, TypeAlias, cast
@@ -54,7 +55,12 @@ def longest(numbers: Iterable[Fraction]) -> int:
 
 def rational(given: Any) -> Fraction:
     """Read an exact number: -2, 3/4, or the hexadecimal form of a float, which is its exact value."""
-    text = given if isinstance(given, str) else ""
+    return written(given if isinstance(given, str) else "")
+
+
+@lru_cache(1024)
+def written(text: str) -> Fraction:
+    """Read the text of a number; those of a symmetric matrix stand twice."""
     if match := _FLOAT.fullmatch(text):
         sign, whole, after, exponent = match.groups(default="")
         demand(abs(int(exponent)) <= 1100, "a float is out of range")
@@ -185,6 +191,8 @@ def times(a: Rows, b: Rows) -> Rows:
 
 def plus(a: Rows, b: Rows, c: Fraction | int = 1) -> Rows:
     """Return a + c b."""
+    if c == -1:
+        return [[x - y if y else x for x, y in zip(s, t, strict=True)] for s, t in zip(a, b, strict=True)]
     more = b if c == 1 else [[c * y if y else y for y in row] for row in b]
     return [[x + y if y else x for x, y in zip(s, t, strict=True)] for s, t in zip(a, more, strict=True)]
 

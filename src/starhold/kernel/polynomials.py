@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property, reduce
 from itertools import product
 from math import gcd, lcm
 from operator import mul
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from .numbers import Account, Rows, demand, rational, read_dict, up, whole
 
@@ -22,12 +22,12 @@ class Poly:
     """A polynomial holds its nonzero coefficients by monomial: integers (`upper`) over a common denominator (`lower`), in
     lowest terms. It is immutable."""
 
-    def __init__(self, terms: Mapping[Monomial, Fraction | int], lower: int = 1) -> None:
-        """Take coefficients over a positive number."""
-        numbers, below = whole([*terms.values()])
-        common = gcd(below * lower, *numbers)
-        self.upper = {m: c // common for m, c in zip(terms, numbers, strict=True) if c}
-        self.lower = below * lower // common
+    def __init__(self, terms: Mapping[Monomial, Fraction | int], lower: int = 0) -> None:
+        """Take coefficients, or integers over a positive number."""
+        numbers, below = (cast(Collection[int], terms.values()), lower) if lower else whole([*terms.values()])
+        common = gcd(below, *numbers)
+        self.upper = {m: c // common if common > 1 else c for m, c in zip(terms, numbers, strict=True) if c}
+        self.lower = below // common
         self._slopes = dict[str, Poly]()
         demand(len(self.upper) <= TERMS, "a polynomial is too long")
 

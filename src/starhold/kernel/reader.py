@@ -74,6 +74,8 @@ class Reader(ABC):
         sizes = as_told(region.sizes, wrong)
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
         all_told = added([*full.values()], [*wrong.values()])
+        if not any(self.noise):
+            return all_told, all_told
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
         away, (turned, rated) = sizes[ANGLE], self.noise
         near = sizes | {"v": away * away}
