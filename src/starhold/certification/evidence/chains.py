@@ -21,7 +21,7 @@ from starhold.certification.evidence.squares import rounded
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
 from starhold.kernel.numbers import RefusedError, plus, times, transpose
-from starhold.kernel.regions import STATE, Tube, balls, factored, least_form
+from starhold.kernel.regions import STATE, Tube, balls
 from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
 from starhold.kernel.theorems.response import Response, first_of, responds
 
@@ -30,9 +30,8 @@ linalg: Any = import_module("scipy.linalg")
 FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 4.0, 40, 24
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
 the largest ratio of successive levels; the most levels and ellipsoids."""
-SMALLER, FAR = 4, 0.05
-"""The ratio of the levels that tell how disturbances weigh in sets of different size; and by how much a form, in units of
-its diagonal, has to be indefinite not to count as a near miss."""
+SMALLER = 4
+"""The ratio of the levels that tell how disturbances weigh in sets of different size."""
 LOWER, SHORTEST, WORTH, ALIKE = 0.9, 0.12, 1.003, 1.005
 """The share of a level that the next one is at most; the least share of the largest ratio, in powers; up to which multiple
 of the last bound no further response is worth its time, and up to which multiple of another a bound counts as no wider."""
@@ -67,8 +66,8 @@ class Chain:
     motion: Held
     V: str
     level: float
-    tried: dict[Any, Any] = field(default_factory=dict[Any, Any])
-    """The results of `falls`, and the form of `rises`, for all chains of one V."""
+    tried: dict[Any, Falls] = field(default_factory=dict[Any, Falls])
+    """The results of `falls`, for all chains of one V."""
     shape: Shape = field(default_factory=lambda: Shape(0.0))
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
@@ -145,8 +144,6 @@ class Chain:
     def sought(self, c: Fraction) -> Falls:
         """Find what `falls` returns."""
         motion = self.motion
-        if self.rises(c):
-            return Falls()
         try:
             exact, above, felt, push, rest, spare = motion.fall(on_level(motion, c)[0])
         except RefusedError:
@@ -165,19 +162,6 @@ class Chain:
                 falls.append((t, b, (push * push / (4 * t) + rest) / b))
         falls.sort(key=lambda one: one[2])
         return falls
-
-    def rises(self, c: Fraction) -> bool:
-        """Return whether V does not decrease by far on a level even with a torque that is not held, which takes no long
-        polynomials to tell."""
-        if "rise" not in self.tried:
-            commanded = {f"u{k + 1}": p for k, p in enumerate(self.motion.pull)}
-            self.tried["rise"] = factored(-self.motion.rate.at(commanded))
-        try:
-            form = floats(least_form(self.tried["rise"], self.motion.region(c)))
-        except RefusedError:
-            return True
-        scale = np.sqrt(np.maximum(np.diag(form), 1e-300))
-        return float(np.linalg.eigvalsh(form / np.outer(scale, scale))[0]) < -FAR
 
     def tighten(self, tube: Tube) -> Ends:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""

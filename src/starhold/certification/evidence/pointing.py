@@ -175,11 +175,16 @@ class Pushed:
     ) -> Iterator[tuple[float, tuple[float, ...]]]:
         """Yield the rotations to begin from, the largest first, each with the rates to begin at there."""
 
-        def far_enough(angle: float) -> bool:
-            # A start within a smaller set is also within the larger one, but that of a set may be too small for its V.
-            return self.kept(self.may_begin, angle, rate, limits) or (angle, rate, *limits.items()) in self.too_near
+        def starting(angle: float) -> bool:
+            return self.kept(self.may_begin, angle, rate, limits)
 
-        first = bisect_left(angles, True, key=far_enough)
+        def far_enough(angle: float) -> bool:
+            return starting(angle) or (angle, rate, *limits.items()) in self.too_near
+
+        # A start within a smaller set is also within the larger one. Where none begins, sets may be too small for their V.
+        first = bisect_left(angles, True, key=starting)
+        if first == len(angles):
+            first = bisect_left(angles, True, key=far_enough)
         faster = [one for one in beyond if one > rate > 0.0]
         for angle in angles[first:]:
             if (angle, rate, *limits.items()) in self.too_near:
