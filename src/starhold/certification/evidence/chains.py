@@ -30,6 +30,8 @@ linalg: Any = import_module("scipy.linalg")
 FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 4.0, 40, 24
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
 the largest ratio of successive levels; the most levels and ellipsoids."""
+SMALLER = 4
+"""The ratio of the levels that tell how disturbances weigh in sets of different size."""
 LOWER, SHORTEST, WORTH, ALIKE = 0.9, 0.12, 1.003, 1.005
 """The share of a level that the next one is at most; the least share of the largest ratio, in powers; up to which multiple
 of the last bound no further response is worth its time, and up to which multiple of another a bound counts as no wider."""
@@ -95,6 +97,13 @@ class Chain:
         """Return whether V decreases on the whole set, down to a noticeably lower level, or to any lower one."""
         lower = self.lower(Fraction(self.level))
         return lower is not None and float(lower[2]) * (FLOOR / LOWER if noticeably else 1.0) < self.level
+
+    def wants_more(self) -> bool:
+        """Return whether larger sets may do where V does not decrease to a lower level on this one: relative to the level,
+        disturbances weigh more on a smaller set still. Where the motion itself is too fast for V they weigh less there."""
+        here, c = self.lower(Fraction(self.level)), Fraction(self.level) / SMALLER
+        less = None if here is None else self.lower(c)
+        return here is not None and less is not None and here[2] / less[2] < SMALLER
 
     def of_level(self) -> dict[str, Any]:
         """Return the claim's numbers that follow from its level."""

@@ -119,6 +119,7 @@ class Pushed:
         demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
         self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
+        self.too_near = set[tuple[Any, ...]]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= numbers_of(loop.known.late)
@@ -173,10 +174,21 @@ class Pushed:
         self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]
     ) -> Iterator[tuple[float, tuple[float, ...]]]:
         """Yield the rotations to begin from, the largest first, each with the rates to begin at there."""
-        # A start within a smaller set is also within the larger one.
-        first = bisect_left(angles, True, key=lambda angle: self.kept(self.may_begin, angle, rate, limits))
+
+        def starting(angle: float) -> bool:
+            return self.kept(self.may_begin, angle, rate, limits)
+
+        def far_enough(angle: float) -> bool:
+            return starting(angle) or (angle, rate, *limits.items()) in self.too_near
+
+        # A start within a smaller set is also within the larger one. Where none begins, sets may be too small for their V.
+        first = bisect_left(angles, True, key=starting)
+        if first == len(angles):
+            first = bisect_left(angles, True, key=far_enough)
         faster = [one for one in beyond if one > rate > 0.0]
         for angle in angles[first:]:
+            if (angle, rate, *limits.items()) in self.too_near:
+                break
             place = bisect_left(faster, True, key=lambda one: self.kept(self.may_begin, angle, one, limits))
             yield angle, (*faster[place : place + 1], rate)
 
@@ -211,13 +223,15 @@ class Pushed:
         shapes = [lean.shape for lean in self.leans] if not limits else self.within(angle, rate, limits)
         loop.failed[POINTS] = RISES if shapes else "the torque exceeds its limit"
         made = (self.chain(shape, angle, rate) for shape in shapes)
-        together = [] if limits else [*made]
+        together, slow = [] if limits else [*made], list[Chain]()
         for first in together or made:
             # Without limits larger sets may follow, on which disturbances matter less.
-            if first.decreases(noticeably=bool(limits)) and begins(
-                loop, self.claim(first.V, numbers | first.of_level()), first.scales
-            ):
+            if not first.decreases(noticeably=bool(limits)):
+                slow.append(first)
+            elif begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
                 return together or [first]
+        if len(slow) == len(shapes) and any(one.wants_more() for one in slow):
+            self.too_near.add((angle, rate, *limits.items()))
         return []
 
     def within(self, angle: float, rate: float, limits: dict[str, float]) -> list[Shape]:
