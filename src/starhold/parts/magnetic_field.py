@@ -33,6 +33,8 @@ GRID = radians(2.0)
 COARSE, DIVISIONS, CELLS, STEP, CLOSE = radians(5.0), 16, 20_000, 10.0, 0.98
 """The search for the least strength begins with cells of twice this angle, divides them so often, and ends where there are
 more than so many; points at this distance (m) give a derivative; and it shows this share of the least strength."""
+PLACES = 5_000
+"""The most places at which the field is computed at once there, which takes megabytes for each hundred."""
 MORE = 1.0 + 1e-9
 Row: TypeAlias = tuple[int, int, float, float, float, float]
 ROWS: tuple[Row, ...] = (
@@ -180,7 +182,9 @@ def weakest(epoch: Date, nearest: float, farthest: float) -> float:
         return earth_fixed(position, numbers._replace(cosines=cosines, sines=sines))
 
     def at(places: Any) -> Any:
-        return np.array(evaluated(program, position=tuple(places), **given))
+        # All steps of a program keep their values.
+        parts = np.array_split(places, 1 + places.shape[1] // PLACES, axis=1)
+        return np.hstack([evaluated(program, position=tuple(part), **given) for part in parts])
 
     numbers = prepared(epoch)
     given: dict[str, Any] = {"cosines": numbers.cosines, "sines": numbers.sines}
