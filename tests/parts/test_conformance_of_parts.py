@@ -1,5 +1,9 @@
 """The conformance suite of parts: those of starhold pass all of it, and each check finds the fault that it is for."""
 
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
 import pytest
 
 from starhold.conformance.parts import CHECKS, find_part
@@ -43,6 +47,22 @@ def counted():
 
 def examples():"""
 PREPARED = "def prepare(params, period):\n    return Params(params.drag * period)\n\n\ndef torque"
+STAYING = """from starhold.parts.contract import Errors, Noise
+
+
+def error(params):
+    return Errors()
+
+
+def noise(params, period):
+    return Noise(rate=params.noise)
+
+
+def remember(params, state):
+    return ZERO
+
+
+def measure"""
 BROKEN = {
     "a counter of its own": (
         "environment",
@@ -104,6 +124,25 @@ BROKEN = {
         },
         {"keeps_what_it_says"},
     ),
+    "a torque that is larger elsewhere on the orbit": (
+        "environment",
+        {
+            "def torque": "def bound(params, envelope):\n    return Push(params.drag)\n\n\ndef torque",
+            "import Card, Parameter": "import Card, Parameter, Push",
+            "scale(-params.drag, state.rate)": "(params.drag * 4.9e13 / dot(state.position, state.position), 0.0, 0.0)",
+        },
+        {"keeps_what_it_says"},
+    ),
+    "errors that stay for a while": (
+        "sensor",
+        {
+            "def measure": STAYING,
+            "dice.vector(0, params.noise))), memory": (
+                "memory)), add(scale(0.98, memory), dice.vector(0, 0.2 * params.noise))"
+            ),
+        },
+        {"draws_as_it_says"},
+    ),
     "a torque that changes faster than it says": (
         "environment",
         {
@@ -131,6 +170,30 @@ def test_each_fault_is_found(kind, tmp_path):
     role, changes, found_by = BROKEN[kind]
     (tmp_path / "mine.py").write_text(replaced(PARTS[role][0], *changes.items()))
     assert {v.outcome for v in outcomes(find_part(str(tmp_path / "mine.py")), found_by).values()} == {"failed"}
+
+
+def halved(said):
+    """What a part says, by half."""
+    fields = {"attitude", "rate", "torque", "deviation"} & {*said._fields} or {"error"}
+    return said._replace(**{name: (np.array(getattr(said, name)) / 2.0).tolist() for name in fields})
+
+
+@pytest.mark.parametrize(
+    ("role", "name", "hook"),
+    [
+        ("sensor", "gyro", "noise"),
+        ("sensor", "star-tracker", "noise"),
+        ("environment", "random-torque", "noise"),
+        ("sensor", "sun-sensor", "direction"),
+        ("sensor", "gnss", "place"),
+    ],
+)
+def test_random_errors_twice_as_large_as_said_are_found(role, name, hook):
+    part, module = parts(role)[name], ModuleType(name)
+    tell = part.hook(hook)
+    vars(module).update({**vars(part.module), hook: lambda *given: halved(tell(*given))})
+    found = outcomes(replace(part, module=module), {"draws_as_it_says"})["draws_as_it_says"]
+    assert found.outcome == "failed"
 
 
 def test_every_check_has_found_something():

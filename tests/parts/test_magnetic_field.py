@@ -1,3 +1,4 @@
+import tracemalloc
 from datetime import datetime
 
 import erfa
@@ -131,3 +132,12 @@ def test_nowhere_is_the_field_weaker_or_steeper_than_its_bounds():
     ahead, here, behind = (at(many + k * way) for k in (1.0, 0.0, -1.0))
     assert 0.25 * steep < np.linalg.norm(ahead - behind, axis=0).max() / 200.0 < steep
     assert 0.1 * curved < np.linalg.norm(ahead - 2.0 * here + behind, axis=0).max() / 1e4 < curved
+
+
+def test_the_least_strength_on_an_eccentric_orbit_costs_little_memory():
+    tracemalloc.start()
+    try:
+        assert weakest((2026.0, 3.0, 20.0, 12.0, 0.0, 0.0), 6.6e6, 7.8e6) > 1e-5
+        assert tracemalloc.get_traced_memory()[1] < 2e8
+    finally:
+        tracemalloc.stop()

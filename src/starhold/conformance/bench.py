@@ -8,7 +8,7 @@ import numpy as np
 
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
 from starhold.algebra.structure import unflatten
-from starhold.algebra.vector import ZERO, Vector, add, norm, scale
+from starhold.algebra.vector import ZERO, Vector, add, apply, norm, scale
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -16,7 +16,9 @@ from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit, telling
 from starhold.parts.contract import DEVIATIONS
 from starhold.parts.craft import Craft, make_craft
+from starhold.parts.part import Part
 from starhold.parts.random import Silent
+from starhold.studies.body import body_module
 
 CRAFT = make_craft([2.0, 3.0, 4.0], torque_limit=0.05)
 PERIOD = 0.1
@@ -99,3 +101,19 @@ def moving(loop: ClosedLoop, random: np.random.Generator) -> Iterator[tuple[Any,
         onward = (math.cos(half), *scale(math.sin(half) / half if half else 1.0, turn))
         state = state._replace(rate=rate, attitude=normalise(multiply(state.attitude, onward)))
         fast, hurried = max(fast, norm(rate)), max(hurried, norm(change))
+
+
+def loop_with(part: Part, params: Any) -> ClosedLoop:
+    """Return a loop with a part and the parts that it needs."""
+    return body_module("starhold.conformance.bodies", part.body or "rigid-body").loop_with(part, params)
+
+
+def momentum_of(loop: ClosedLoop, carry: Any) -> Vector:
+    """Return the angular momentum of body and effectors (N m s, body axes)."""
+    total = apply(loop.craft.inertia, carry.state.rate)
+    for fitted, state, prepared in zip(loop.used("effector"), carry.effectors, loop.setup().effectors, strict=True):
+        module = fitted.part.module
+        total = add(total, module.momentum(state, prepared))
+        if fitted.part.hook("inertia_change") is not None:
+            total = add(total, apply(module.inertia_change(state, prepared), carry.state.rate))
+    return total

@@ -38,16 +38,20 @@ def misdirected(part: Part, loop: ClosedLoop) -> Iterator[tuple[str, float, floa
         yield from _of_sensor(part, loop) if part.role == "sensor" else _of_estimator(part, loop)
 
 
+def sky_at(params: Any, loop: ClosedLoop) -> Sky:
+    """Return a loop's surroundings where it starts, for a sensor with these parameters."""
+    strength, distance = _directions(params, loop.start.position, 0.0)["strength"], norm(loop.start.position)
+    steepest = magnetic_field.steepest(getattr(params, "epoch", START), distance)
+    return Sky(strength, steepest / strength, distance, norm(loop.start.velocity))
+
+
 def _of_sensor(part: Part, loop: ClosedLoop) -> Iterator[tuple[str, float, float]]:
     """Yield errors of the directions that a sensor measures without noise, and their bounds, where the field is as strong as
     at the start."""
     fitted = next(f for f in loop.parts if f.part == part)
     module, random, numbers = part.module, np.random.default_rng(1), fitted.prepared(loop.period)
     memory, params = fitted.remembered(numbers, loop.start), fitted.params
-    there = _directions(params, loop.start.position, 0.0)
-    strength, distance = there.pop("strength"), norm(loop.start.position)
-    sky = Sky(strength, magnetic_field.steepest(getattr(params, "epoch", START), distance) / strength, distance, 0.0)
-    said: Direction = module.direction(params, loop.period, sky)
+    said: Direction = module.direction(params, loop.period, sky_at(params, loop)._replace(speed=0.0))
     states = (moving if said.late else anywhere)(loop, random)
     for step, (state, fast, _) in enumerate(islice(states, 2 * STEPS)):
         reading, memory = module.measure(state, memory, numbers, Silent(), step)

@@ -35,6 +35,8 @@ PARALLELS = 12
 COARSE, DIVISIONS, CELLS, STEP, CLOSE = radians(5.0), 16, 20_000, 10.0, 0.98
 """The search for the least strength begins with cells of twice this angle, divides them so often, and ends where there are
 more than so many; points at this distance (m) give a derivative; and it shows this share of the least strength."""
+PLACES = 5_000
+"""The most places at which the field is computed at once there, which takes megabytes for each hundred."""
 MORE = 1.0 + 1e-9
 Row: TypeAlias = tuple[int, int, float, float, float, float]
 ROWS: tuple[Row, ...] = (
@@ -170,7 +172,12 @@ def weakest(epoch: Date, nearest: float, farthest: float) -> float:
     are divided."""
     import numpy as np
 
-    at = _columns(epoch)
+    columns = _columns(epoch)
+
+    def at(places: Any) -> Any:
+        # All steps of a program keep their values.
+        return np.hstack([columns(part) for part in np.array_split(places, 1 + places.shape[1] // PLACES, axis=1)])
+
     half = np.array([(farthest - nearest) / 2.0, COARSE, COARSE])
     axes = [np.arange(-limit + COARSE, limit, 2.0 * COARSE) for limit in (pi / 2.0, pi)]
     cells = np.array([x.ravel() for x in np.meshgrid((nearest + farthest) / 2.0, *axes)])

@@ -1,0 +1,173 @@
+"""Checks that what parts say of their torques, errors and motions bounds these."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from math import inf, pi
+from typing import Any, cast
+
+import numpy as np
+
+from starhold.algebra.quaternion import NO_TURN, conjugate, multiply, normalise, vector_part
+from starhold.algebra.vector import ZERO, Vector, add, norm, scale, subtract
+from starhold.certification.measured import bounded
+from starhold.certification.target_motion import motion_of
+from starhold.certification.unmodelled import COMMANDED, envelope_of
+from starhold.conformance.bench import PERIOD, Jumping, anywhere, loop_with, momentum_of, moving
+from starhold.conformance.directions import misdirected, tells
+from starhold.conformance.verdicts import STEPS, NotApplicableError, require
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import UNBOUNDED, Errors, Push
+from starhold.parts.orbit import at_anomaly
+from starhold.parts.part import Fitted, Part
+from starhold.parts.random import Dice
+from starhold.simulation.lane import fly
+
+
+def keeps_what_it_says(part: Part) -> None:
+    """No torque is larger than its `bound` or changes faster than its `torque_change`, no error is larger than its `error`,
+    `direction` or `combined`, besides its `noise`, and no motion of a target than its `motion`; outputs follow commands as
+    it says by `late`."""
+    if part.hook("late") is not None:
+        _follows_as_it_says(part)
+        return
+    # A body has an equation of this name.
+    if part.role == "target" and part.hook("motion") is not None:
+        _moves_as_it_says(part)
+        return
+    tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
+    if not (tells(part) or tell_torque or tell_errors or tell_change):
+        raise NotApplicableError("it says no bound of its torque, of its errors or of its motion")
+    for params in part.examples():
+        loop = loop_with(part, params)
+        # In a few steps external torques contribute little momentum.
+        envelope = envelope_of(loop, 1.01 * norm(momentum_of(loop, loop.carry())), noisy=True)
+        errors, command = UNBOUNDED, Push(inf)
+        if tell_errors and part.role in COMMANDED:
+            command = tell_errors(params, envelope)
+        elif tell_errors:
+            errors = bounded(next(f for f in loop.parts if f.part == part), loop.period) or UNBOUNDED
+        torque = tell_torque(params, envelope) if tell_torque else Push(inf)
+        change = tell_change(params, loop.craft, envelope) if tell_change else Push(inf)
+        limits = (*errors, *torque, *command, *change)
+        require(min(limits) >= 0.0, f"the bounds {limits} are not all positive or 0")
+        pushed = _pushes(part, loop, errors, torque, command)
+        for name, size, bound in (*pushed, *(_changes(part, loop, change) if tell_change else ()), *misdirected(part, loop)):
+            require(size <= bound * (1.0 + 1e-9) + 1e-12, f"the {name} is {size:g}, larger than {bound:g}")
+
+
+def _changes(part: Part, loop: ClosedLoop, change: Push) -> Iterator[tuple[str, float, float]]:
+    """Yield the rate of change of a part's torque on the orbit, on rotating and non-rotating bodies, and its bounds."""
+    module, numbers = part.module, next(f for f in loop.parts if f.part == part).prepared(loop.period)
+    random, time = np.random.default_rng(2), 1e-3
+    memory = module.remember(numbers) if part.hook("remember") else None
+    for rate in (ZERO, *(cast(Any, tuple(x)) for x in random.normal(size=(STEPS, 3)).tolist())):
+        for turned in random.normal(size=(STEPS, 4)):
+            attitude: Any = tuple((turned / np.linalg.norm(turned)).tolist())
+            torques: list[Vector] = []
+            for t in (-time, time):
+                state = loop.start._replace(
+                    attitude=normalise(multiply(attitude, (1.0, *scale(0.5 * t, rate)))),
+                    rate=rate,
+                    position=add(loop.start.position, scale(t, loop.start.velocity)),
+                )
+                torques.append(module.torque(state, numbers, loop.craft, memory))
+            size = norm(subtract(torques[1], torques[0])) / (2.0 * time)
+            yield "change of the torque", size, change.torque + change.per_rate * norm(rate)
+
+
+def _follows_as_it_says(part: Part) -> None:
+    """An actuator's output, in fine steps, comes nearer to a held command as `late` says, whatever it is off by at first."""
+    module, random, steps = cast(Any, part.module), np.random.default_rng(4), 2000
+    for params in part.examples():
+        numbers, late = Fitted(part, params).prepared(PERIOD), module.late(params, PERIOD)
+        require(0.0 <= late.kept < 1.0 and 0.0 < late.mean <= 1.0 and late.most > 0.0, f"{late} is not of what is late")
+        for _ in range(STEPS):
+            target = random.normal(size=3)
+            off = random.uniform(-1.0, 1.0, size=3) * min(late.most, 1.0) * 0.999
+            *outputs, wanted = (cast(Vector, tuple(x.tolist())) for x in (target + off, target))
+            for _ in range(steps):
+                rate = module.rates(outputs[-1], wanted, outputs[0], PERIOD, numbers)
+                outputs.append(add(outputs[-1], scale(PERIOD / steps, rate)))
+            sizes = np.linalg.norm(np.array(outputs) - target, axis=1) / np.linalg.norm(off)
+            between = (sizes[:-1] + sizes[1:]) / 2.0
+            mean, moment = (float((between * share).mean()) for share in (1.0, 1.0 - (np.arange(steps) + 0.5) / steps))
+            require(bool(np.diff(sizes).max() < 1e-9), "it goes away from the command")
+            for name, size, most in (("mean", mean, late.mean), ("kept", sizes[-1], late.kept)):
+                require(size <= most + 1e-3, f"{name} is {size:g}, larger than {most:g}")
+                require(late.moment is None or size >= most - 1e-3, f"{name} is {size:g}, and not exactly {most:g}")
+            if late.moment is None:
+                continue
+            require(abs(moment - late.moment) <= 1e-3, f"the mean by the time left is {moment:g}, and not {late.moment}")
+            aside = float(np.linalg.norm(np.cross(outputs[-1] - target, off)))
+            require(aside <= 1e-9 * float(off @ off), "it comes nearer otherwise in each component")
+
+
+def _moves_as_it_says(part: Part) -> None:
+    """Check a target's rate and acceleration at points of the orbit and instants of a year or of the time that it states."""
+    for params in part.examples():
+        loop, random = loop_with(part, params), np.random.default_rng(3)
+        motion = motion_of(loop)
+        if motion is None:
+            continue
+        numbers, module, seen = Fitted(part, params).prepared(loop.period), cast(Any, part.module), NO_TURN
+        for step in np.linspace(0.0, min(motion.until, 3e7) / loop.period, 20 * STEPS):
+            state = loop.start
+            if loop.has("two-body"):
+                position, velocity = at_anomaly(state.position, state.velocity, loop.craft.gravity, 6.3 * random.uniform())
+                state = state._replace(position=position, velocity=velocity)
+            seen, *moved = module.goal(numbers, state, int(step), seen)
+            for name, vector, most in zip(("rate", "acceleration"), moved, motion, strict=False):
+                require(norm(vector) <= most * (1.0 + 1e-9), f"the {name} is {norm(vector):g}, larger than {most:g}")
+
+
+def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:
+    """Yield torques and errors of a part at states of a flight and at other attitudes, with their bounds."""
+    dice = Jumping() if part.hook("noise") else Dice((1, 2), 3, 0)
+    fitted, module, random = next(f for f in loop.parts if f.part == part), part.module, np.random.default_rng(1)
+    numbers = fitted.prepared(loop.period)
+
+    def most(push: Push, state: Any) -> float:
+        return push.torque + push.per_rate * norm(state.rate)
+
+    memory = fitted.remembered(numbers, *([loop.start] if part.role in ("sensor", "estimator") else []))
+    states = (moving if errors.grow else anywhere)(loop, random)
+    for step, (state, fast, hurried) in enumerate(islice(states, STEPS)):
+        if part.role == "environment":
+            # On all of the orbit.
+            place, speed = at_anomaly(state.position, state.velocity, loop.craft.gravity, 2.0 * pi * random.uniform())
+            state = state._replace(position=place, velocity=speed) if loop.has("two-body") else state
+            memory = module.update(memory, state, numbers, dice, step) if part.hook("update") else memory
+            yield "torque", norm(module.torque(state, numbers, loop.craft, memory)), most(torque, state)
+        elif part.role == "sensor":
+            reading, memory = module.measure(state, memory, numbers, dice, step)
+            if hasattr(reading, "attitude"):
+                # The angle, for either sign of the quaternion.
+                turn = 2.0 * norm(vector_part(multiply(conjugate(state.attitude), reading.attitude)))
+                yield "error of the attitude", turn, errors.attitude + errors.turning * fast
+            if hasattr(reading, "rate"):
+                yield (
+                    "error of the rate",
+                    norm(subtract(reading.rate, state.rate)),
+                    errors.rate + errors.turned * fast + errors.late * hurried,
+                )
+        elif part.role == "actuator" and part.hook("command"):
+            torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
+            yield (
+                "error of the command",
+                norm(subtract(module.command(torque_wanted, numbers), torque_wanted)),
+                command.torque,
+            )
+    if part.role == "effector":
+        for step in (1, 5, STEPS):
+            end = fly(loop, step)[1]
+            effector = end.effectors[[f.part for f in loop.used("effector")].index(part)]
+            if part.hook("bound"):
+                yield "torque", norm(module.reaction(effector, None, end.state, numbers)), most(torque, end.state)
+            if part.hook("error"):
+                torque_wanted = scale(
+                    0.1 * module.sure_torque(numbers, "norm"), cast(Any, tuple(random.uniform(-1, 1, 3).tolist()))
+                )
+                torque_given = module.applied(effector, module.command(torque_wanted, numbers), end.state, numbers)
+                yield "error of the command", norm(subtract(torque_given, torque_wanted)), most(command, end.state)

@@ -1,0 +1,143 @@
+"""Checks that random errors are as parts say: no larger, and new at each reading; and places no further off than is said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.quaternion import conjugate, multiply, vector_part
+from starhold.algebra.vector import ZERO, Vector, add, norm, scale, subtract, unit
+from starhold.certification.measured import bounded
+from starhold.conformance.bench import loop_with
+from starhold.conformance.directions import sky_at
+from starhold.conformance.verdicts import NotApplicableError, require
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import DEVIATIONS, Direction, Noise, Place
+from starhold.parts.part import Fitted, Part
+from starhold.parts.random import Dice, Silent
+from starhold.parts.vectors import KINDS
+
+Array = NDArray[np.float64]
+FLIGHTS, BEFORE, READINGS, MORE = 40, 32, 8, 1.5
+"""In so many flights, after so many readings, the errors of some more are summed: sums of what is new each time are rarely
+more than this multiple of their deviation in the mean, while errors that stay add up to nearly three times that."""
+
+
+class Scatter(NamedTuple):
+    """A reading's name, what its errors are sums of, (flights, 3), their covariance as it is said (3, 3), and what else
+    they may contain."""
+
+    name: str
+    sums: Array
+    said: Array
+    besides: float = 0.0
+
+
+def draws_as_it_says(part: Part) -> None:
+    """Random errors are no larger than its `noise` or `direction` says, and independent; a place is within its `place`."""
+    if not any(map(part.hook, ("noise", "direction", "place"))):
+        raise NotApplicableError("it says nothing of random errors")
+    for params in part.examples():
+        loop = loop_with(part, params)
+        fitted = next(f for f in loop.parts if f.part == part)
+        for name, sums, said, besides in _scatters(fitted, loop):
+            square = sums.T @ sums / len(sums)
+            for way in np.linalg.eigh(square - MORE**2 * said)[1].T:
+                size, most = (float(np.sqrt(way @ x @ way / READINGS)) for x in (square, said))
+                require(
+                    size <= MORE * most + besides + 1e-12,
+                    f"random part of the {name} is {size:g} in the mean of {READINGS} readings, that said {most:g}",
+                )
+        if part.hook("place"):
+            _places(fitted, loop)
+
+
+def _scatters(fitted: Fitted, loop: ClosedLoop) -> Iterator[Scatter]:
+    """Yield the random errors of a part with bounds: of a torque, of an attitude or a rate, of a direction."""
+    part, module, each = fitted.part, fitted.part.module, READINGS * np.eye(3)
+    tell: Any = part.hook("noise")
+    noise: Noise = Noise() if tell is None else tell(fitted.params, loop.period)
+    if part.role == "environment":
+        yield Scatter("torque", _torques(fitted, loop), noise.torque**2 * each)
+        return
+    errors = bounded(fitted, loop.period) if part.hook("error") else None
+    if tell is not None and errors is not None:
+        # A step of a walk is in all later readings.
+        walk = (sum(k * k for k in range(READINGS)) / READINGS + BEFORE * READINGS) * noise.walk**2
+        turns = np.array(noise.attitude)
+        said = {"rate": (noise.rate**2 + walk) * each, "attitude": turns @ turns.T * READINGS}
+        steps = {"rate": _steps(errors.rate - errors.bias, noise.rate), "attitude": _steps(errors.attitude, turns.max())}
+        for name in said.keys() & {*module.Reading._fields}:
+            yield Scatter(f"error of the {name}", _sums(fitted, loop, name, noise.every), said[name], steps[name])
+    if part.hook("direction"):
+        seen: Direction = module.direction(fitted.params, loop.period, sky_at(fitted.params, loop))
+        if isfinite(seen.error):
+            sums = _sums(fitted, loop, KINDS[seen.of][0], seen.every)
+            steps_of = _steps(seen.error, seen.deviation)
+            yield Scatter(f"error of the {seen.of}", sums, seen.deviation**2 * each, steps_of)
+
+
+def _steps(error: float, deviation: float) -> float:
+    """Return what noise may add by the steps of a reading, which are a part of its other errors, to their sum over the root
+    of their number: where these errors are not small, twice as much at each reading."""
+    return 2.0 * error * float(np.sqrt(READINGS)) if error > 2.0 * deviation else 0.0
+
+
+def _sums(fitted: Fitted, loop: ClosedLoop, name: str, every: int) -> Array:
+    """Return sums of the differences of readings with and without random numbers, of those that are new."""
+    module, numbers, summed = fitted.part.module, fitted.prepared(loop.period), np.zeros((FLIGHTS, 3))
+
+    def readings(drawn: Any) -> list[Any]:
+        memory, seen = fitted.remembered(numbers, loop.start), list[Any]()
+        for step in range((BEFORE + READINGS) * every):
+            reading, memory = module.measure(loop.start, memory, numbers, drawn(step), step)
+            seen.append(reading)
+        return seen[BEFORE * every :: every]
+
+    still, flags = readings(Silent), (f"{name}_is_new", f"{name}_is_seen")
+    for flight in range(FLIGHTS):
+        for quiet, seen in zip(still, readings(lambda step, flight=flight: Dice((1, flight), step, 0)), strict=True):
+            if all(getattr(one, flag, 1.0) > 0.5 for one in (seen, quiet) for flag in flags):
+                summed[flight] += _apart(name, getattr(quiet, name), getattr(seen, name))
+    return summed
+
+
+def _apart(name: str, quiet: Any, seen: Any) -> Vector:
+    """Return by how much a reading differs from another one, as a rotation (rad) if it is an attitude."""
+    if name == "attitude":
+        turned = multiply(conjugate(quiet), seen)
+        return scale(2.0 if turned[0] >= 0.0 else -2.0, vector_part(turned))
+    return subtract(seen, quiet) if name == "rate" else subtract(unit(seen), unit(quiet))
+
+
+def _torques(fitted: Fitted, loop: ClosedLoop) -> Array:
+    """Return sums of the random torques of an environment."""
+    module, numbers, summed = fitted.part.module, fitted.prepared(loop.period), np.zeros((FLIGHTS, 3))
+    for flight in range(FLIGHTS):
+        memory = still = fitted.remembered(numbers)
+        for step in range(BEFORE + READINGS):
+            memory = module.update(memory, loop.start, numbers, Dice((1, flight), step, 0), step)
+            still = module.update(still, loop.start, numbers, Silent(), step)
+            given = (module.torque(loop.start, numbers, loop.craft, one) for one in (memory, still))
+            summed[flight] += subtract(*given) if step >= BEFORE else ZERO
+    return summed
+
+
+def _places(fitted: Fitted, loop: ClosedLoop) -> None:
+    """Check how far places are off as a craft moves on, with noise as large as it is assumed to be."""
+    module, numbers, start = fitted.part.module, fitted.prepared(loop.period), loop.start
+    said: Place = module.place(fitted.params, sky_at(fitted.params, loop))
+    memory = still = fitted.remembered(numbers, start)
+    squares, late = list[float](), 0.0
+    for step in range(FLIGHTS * READINGS):
+        state = start._replace(position=add(start.position, scale(step * loop.period, start.velocity)))
+        reading, memory = module.measure(state, memory, numbers, Dice((1, 0), step, 0), step)
+        quiet, still = module.measure(state, still, numbers, Silent(), step)
+        late = max(late, norm(subtract(quiet.position, state.position)))
+        squares.append(norm(subtract(reading.position, quiet.position)) ** 2 / 3.0)
+    off = late + DEVIATIONS / MORE * float(np.sqrt(np.mean(squares)))
+    require(off <= said.error * (1.0 + 1e-9) + 1e-6, f"the place is off by {off:g} m, and not {said.error:g} m")
