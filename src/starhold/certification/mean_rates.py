@@ -48,12 +48,19 @@ def strays(loop: ClosedLoop, rate: Any, torque: Any, stored: Any) -> Array:
     """Return, to the lowest order, the turns of a body in a period beside those at the mean of its rates at both ends (n,;
     rad). rate, torque, stored: the rates (n, 3; rad/s), the torques that are held (N m) and the wheels' momentum (N m s) as
     the period begins, body axes; None without wheels."""
-    J = tensor(loop.craft.inertia)
-    momentum = rate @ J + (0.0 if stored is None else stored)
-    turning = np.cross(momentum, rate)
-    acceleration = np.linalg.solve(J, (torque + turning).T).T
-    carried = turning + (torque if stored is None else 0.0)
-    change = np.linalg.solve(J, (np.cross(momentum, acceleration) - np.cross(rate, carried)).T).T
+    J, half = tensor(loop.craft.inertia), 0.5 * loop.period
+    inverse: Any = np.linalg.inv(J)
+    momentum, external = (rate @ J, torque) if stored is None else (rate @ J + stored, 0.0)
+
+    def accelerated(rate: Any, momentum: Any) -> tuple[Any, Any]:
+        turning = np.cross(momentum, rate)
+        return (torque + turning) @ inverse, turning + external
+
+    # In the middle of the period.
+    acceleration, carried = accelerated(rate, momentum)
+    rate, momentum = rate + half * acceleration, momentum + half * carried
+    acceleration, carried = accelerated(rate, momentum)
+    change = (np.cross(momentum, acceleration) - np.cross(rate, carried)) @ inverse
     return loop.period**3 / 12.0 * np.linalg.norm(np.cross(rate, acceleration) - change, axis=1)
 
 
