@@ -237,8 +237,14 @@ def strayed(recursion: Recursion) -> Array | None:
 def _sizes(recursion: Recursion) -> tuple[float, list[Array]]:
     """Return the share of an error that is left after a cycle, in the end, and the result of `_sums` for each step of a
     cycle, nothing for an estimate that does not forget."""
-    every, size = recursion.every, 3 * recursion.size
-    steps = [*[_matrix(recursion.carried, recursion)] * (every - 1), _matrix(recursion.corrected, recursion)]
+    steps = [_matrix(step, recursion) for step in (recursion.carried, recursion.corrected)]
+    return _sizes_of(recursion.every, 3 * recursion.size, tuple(tuple(map(tuple, step.tolist())) for step in steps))
+
+
+@cache
+def _sizes_of(every: int, size: int, matrices: tuple[Any, ...]) -> tuple[float, list[Array]]:
+    carried, corrected = map(np.array, matrices)
+    steps = [*[carried] * (every - 1), corrected]
     motions = [step[:size, :size] for step in steps]
     radius = float(np.abs(np.linalg.eigvals(reduce(lambda one, A: A @ one, motions, np.eye(size)))).max())
     if radius >= 1.0 or (count := ceil(log(SMALL) / log(max(radius, SMALL)))) > MOST:
