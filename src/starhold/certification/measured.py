@@ -238,12 +238,13 @@ def _sizes(recursion: Recursion) -> tuple[float, list[Array]]:
     """Return the share of an error that is left after a cycle, in the end, and the result of `_sums` for each step of a
     cycle, nothing for an estimate that does not forget."""
     steps = [_matrix(step, recursion) for step in (recursion.carried, recursion.corrected)]
-    return _sizes_of(recursion.every, 3 * recursion.size, tuple(tuple(map(tuple, step.tolist())) for step in steps))
+    rows: Any = tuple(tuple(map(tuple, step.tolist())) for step in steps)
+    return _sizes_of(recursion.every, 3 * recursion.size, rows)
 
 
 @cache
 def _sizes_of(every: int, size: int, matrices: tuple[Any, ...]) -> tuple[float, list[Array]]:
-    carried, corrected = map(np.array, matrices)
+    carried, corrected = np.array(matrices[0]), np.array(matrices[1])
     steps = [*[carried] * (every - 1), corrected]
     motions = [step[:size, :size] for step in steps]
     radius = float(np.abs(np.linalg.eigvals(reduce(lambda one, A: A @ one, motions, np.eye(size)))).max())
