@@ -237,8 +237,8 @@ def strayed(recursion: Recursion) -> Array | None:
 def _sizes(recursion: Recursion) -> tuple[float, list[Array]]:
     """Return the share of an error that is left after a cycle, in the end, and the result of `_sums` for each step of a
     cycle, nothing for an estimate that does not forget."""
-    steps = [_matrix(step, recursion) for step in (recursion.carried, recursion.corrected)]
-    rows: Any = tuple(tuple(map(tuple, step.tolist())) for step in steps)
+    steps: list[list[list[float]]] = [_matrix(step, recursion).tolist() for step in (recursion.carried, recursion.corrected)]
+    rows = tuple(tuple(tuple(row) for row in step) for step in steps)
     return _sizes_of(recursion.every, 3 * recursion.size, rows)
 
 
