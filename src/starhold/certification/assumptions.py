@@ -10,8 +10,9 @@ import numpy as np
 
 from starhold.algebra.quaternion import conjugate, multiply, to_reference
 from starhold.algebra.vector import ZERO
-from starhold.certification.certificate import FRESH, LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
+from starhold.certification.certificate import EVEN, FRESH, LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
 from starhold.certification.directions import AGE
+from starhold.certification.mean_rates import misled
 from starhold.certification.orbit_band import strays
 from starhold.certification.target_motion import motion_of
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
@@ -65,6 +66,14 @@ def assumption(identifier: str) -> Assumption:
 
         most = f"at every control instant, or one no older than {age:.6g} s" if age else "at every control instant"
         return Assumption(f"directions that give an attitude {most}, as far apart as the estimator asks for", aged)
+    if identifier.startswith(EVEN):
+        most = float(identifier.removeprefix(EVEN))
+
+        def turned(span: Any) -> Unmet:
+            return [(misled(span) > most, "the body turns otherwise than at the mean of two readings of its gyro")]
+
+        text = f"a body that turns between two readings of its gyro as at their mean, but for {math.degrees(most):.3g}° told"
+        return Assumption(text, turned)
     if identifier.startswith(UNTIL):
         until = float(identifier.removeprefix(UNTIL))
 

@@ -108,7 +108,7 @@ class Claim:
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
-WITHOUT, ORBIT, UNTIL, LATE, FRESH = "without:", "orbit-within:", "until:", "late:", "fresh:"
+WITHOUT, ORBIT, UNTIL, LATE, FRESH, EVEN = "without:", "orbit-within:", "until:", "late:", "fresh:", "even:"
 """The prefixes of the identifiers of assumptions: that a part, role and name, is absent; that forces move the orbit by at
 most a share; that a flight has not lasted longer (s); that the torque is at first no further from the command (N m); and
 that directions gave an attitude no longer ago (s)."""

@@ -206,14 +206,10 @@ def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list
     acceleration of the body; the number of steps after which about a share of an additional error is left, and that share.
     None for an estimate that does not forget. noise: of unit deviations."""
     recursion: Recursion = tell(given[0], noise, *given[1:])
-    every, size = recursion.every, 3 * recursion.size
-    steps = [*[_matrix(recursion.carried, recursion)] * (every - 1), _matrix(recursion.corrected, recursion)]
-    motions = [step[:size, :size] for step in steps]
-    radius = float(np.abs(np.linalg.eigvals(reduce(lambda one, A: A @ one, motions, np.eye(size)))).max())
-    if radius >= 1.0 or (count := ceil(log(SMALL) / log(max(radius, SMALL)))) > MOST:
+    every, (radius, sizes) = recursion.every, _sizes(recursion)
+    if not sizes:
         return None
-    result = [_sums(steps, phase, count, size) for phase in range(every)]
-    lags = np.max([np.cumsum(one[..., ::-1], axis=-1)[..., ::-1] for one in result], axis=0) * (1.0 + 1e-6)
+    lags = np.max([np.cumsum(one[:, :-1, ::-1], axis=-1)[..., ::-1] for one in sizes], axis=0) * (1.0 + 1e-6)
     # From lags of k steps on: rows for attitude and rate, columns for readings.
     towards, later = lags[..., 0].tolist(), (recursion.lag * lags[:, 0, 1]).tolist()
     first = every * max(1, ceil(log(SHARE) / log(max(radius, SMALL))))
@@ -230,24 +226,52 @@ def _gains(tell: Any, given: Any, noise: Noise) -> tuple[list[list[float]], list
     return towards, later, lags.shape[-1], SMALL
 
 
+def strayed(recursion: Recursion) -> Array | None:
+    """Return how far off the attitude is told at most at each later step (lags,), for each unit by which the body turns in a
+    period otherwise than at the mean of two readings; None for an estimate that is propagated otherwise, or does not forget.
+    """
+    sizes = _sizes(recursion)[1] if recursion.strays else []
+    return np.max([one[0, -1] for one in sizes], axis=0) if sizes else None
+
+
+def _sizes(recursion: Recursion) -> tuple[float, list[Array]]:
+    """Return the share of an error that is left after a cycle, in the end, and the result of `_sums` for each step of a
+    cycle, nothing for an estimate that does not forget."""
+    steps: list[list[list[float]]] = [_matrix(step, recursion).tolist() for step in (recursion.carried, recursion.corrected)]
+    rows = tuple(tuple(tuple(row) for row in step) for step in steps)
+    return _sizes_of(recursion.every, 3 * recursion.size, rows)
+
+
+@cache
+def _sizes_of(every: int, size: int, matrices: tuple[Any, ...]) -> tuple[float, list[Array]]:
+    carried, corrected = np.array(matrices[0]), np.array(matrices[1])
+    steps = [*[carried] * (every - 1), corrected]
+    motions = [step[:size, :size] for step in steps]
+    radius = float(np.abs(np.linalg.eigvals(reduce(lambda one, A: A @ one, motions, np.eye(size)))).max())
+    if radius >= 1.0 or (count := ceil(log(SMALL) / log(max(radius, SMALL)))) > MOST:
+        return radius, []
+    return radius, [_sums(steps, phase, count, size) for phase in range(every)]
+
+
 def _sums(steps: list[Array], phase: int, count: int, size: int) -> Array:
-    """Return the sizes of the errors of attitude and rate, at a step of a cycle, due to each reading from 0 to so many
-    cycles of steps before: (2, readings, lags)."""
+    """Return the sizes of the errors of attitude and rate, at a step of a cycle, due to each reading, and to a turn that the
+    estimate leaves out, from 0 to so many cycles of steps before: (2, readings + 1, lags)."""
     every, readings = len(steps), steps[0].shape[1] // 3 - size // 3 - 1
     order = [steps[(phase + k) % every][:size, :size] for k in range(every)]
     motion, amiss = reduce(lambda one, A: A @ one, order, np.eye(size)), steps[phase][size:, :size]
     powers = np.array([amiss])
     while len(powers) < count:
         powers, motion = np.concatenate([powers, powers @ motion]), motion @ motion
-    sizes = np.zeros((2, readings, every * (len(powers) + 1)))
-    # The gyro's, without its walk, and the attitudes', which are new at the last step of a cycle.
-    places = [0, *range(2, readings + 1)]
+    sizes = np.zeros((2, readings + 1, every * (len(powers) + 1)))
+    # The gyro's, without its walk, and the attitudes', which are new at the last step of a cycle; a turn that is left out is
+    # like one by which the attitude, the first of the errors, is off as the step begins.
+    places = [0, *range(2, readings + 1), -size // 3]
     since = np.eye(size)
     for lag in range(every + 1):
         at = (phase - lag) % every
         given = steps[at]
         for k, place in enumerate(places):
-            if k and at != every - 1:
+            if place > 0 and at != every - 1:
                 continue
             column = slice(size + 3 * place, size + 3 * place + 3)
             if lag == 0:

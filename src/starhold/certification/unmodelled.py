@@ -13,6 +13,7 @@ from starhold.algebra.vector import norm
 from starhold.certification.appendages import appendages, tells_momentum
 from starhold.certification.certificate import LATE, ORBIT, STEADY, UNTIL, WITHOUT, Claim
 from starhold.certification.directions import freshness, shown
+from starhold.certification.mean_rates import evenness
 from starhold.certification.measured import (
     Told,
     as_read,
@@ -227,7 +228,7 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         absent = [f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope))]
         estimated = any(f in telling for f in loop.used("estimator"))
         settled = [name for name in SETTLED if estimated and name not in claim.assumptions]
-        settled += freshness(loop) if estimated else []
+        settled += (freshness(loop) + evenness(loop, claim.numbers.get("angle"))) if estimated else []
         share = band_of(loop).share
         behind = [f"{LATE}{claim.numbers['late_torque']!r}"] if claim.numbers.get("late_torque") else []
         names = (f"{WITHOUT}{_called(f)}" for f in absent)

@@ -148,6 +148,8 @@ class Recursion(NamedTuple):
     """Number of vectors of noise."""
     lag: float = 0.0
     """How much of the body's acceleration (s) is at most an error of the rate that counts until the next step."""
+    strays: bool = False
+    """Whether the first error, of the attitude, is propagated from step to step at the mean of the rates there."""
     biased: bool = False
     """Whether a constant bias of the gyro stays in the rate."""
 

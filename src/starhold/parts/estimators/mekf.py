@@ -268,7 +268,7 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
         kept = (add(ahead, apply(gain.ahead, deviation)), bias, now)
         return kept, add(ahead, apply(gain.turn, deviation)), rate
 
-    return Recursion(corrected, drifted, noise.every, 3, 2 + len(seen))
+    return Recursion(corrected, drifted, noise.every, 3, 2 + len(seen), strays=True)
 
 
 @cache
