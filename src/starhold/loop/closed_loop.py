@@ -297,6 +297,10 @@ class ClosedLoop:
             prepared("watcher"),
         )
 
+    def after(self, event: Event) -> Self:
+        """Return the loop as it is from an event on, without further events."""
+        return replace(self, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
+
     def phases(self, steps: int) -> list[Phase]:
         """Return the phases of a run of `steps` control steps, divided at the events."""
         events = (Event(0, self.parts, self.gains, self.craft, self.known), *self.events)

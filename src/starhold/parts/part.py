@@ -109,6 +109,11 @@ class Fitted:
         return self.name or self.part.name
 
     @property
+    def prefix(self) -> str:
+        """The beginning of the names of its recorded quantities, where those would not be unique without it."""
+        return f"{self.called.replace('-', '_')}_"
+
+    @property
     def needs(self) -> tuple[str, ...]:
         """Names of other parts of the loop, or readings, that it needs with these parameters."""
         tell = self.part.hook("needs")
