@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.structure import alike, leaves
@@ -214,6 +215,16 @@ class ClosedLoop:
         """The angular momenta of their rotors at the start (N m s)."""
         fitted = self.find("wheels")
         return () if fitted is None else fitted.start.momentum
+
+    @property
+    def wheel_axes(self) -> tuple[Vector, ...]:
+        """The spin axes of the reaction wheels (body); none without wheels."""
+        return () if self.wheels is None else self.wheels.axes
+
+    @property
+    def stored(self) -> NDArray[np.float64]:
+        """The angular momentum (3,) of the rotors at the start (body, N m s); zero without wheels."""
+        return np.array(self.rotors) @ np.reshape(self.wheel_axes, (-1, 3))
 
     @property
     def target(self) -> Fitted:

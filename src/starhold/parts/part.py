@@ -126,7 +126,7 @@ class Fitted:
         return self.part.about if tell is None else tell(self.params)
 
     def prepared(self, period: float) -> Any:
-        """Return its parameters in the form that equations take, for a control period (s)."""
+        """Return its parameters in the form that its equations take, for a control period (s)."""
         make = self.part.hook("prepare")
         return self.params if make is None else make(self.params, period)
 

@@ -240,19 +240,21 @@ def most_stored(loop: ClosedLoop, place: int, rate: float = 0.0) -> float:
 def fresh_momentum(one: HandOver, rate: float) -> float:
     """Return the largest momentum (N m s) with which a mode begins at this rate (rad/s) after a mode with inactive wheels,
     whose rotors keep their momentum; inf after any other mode, and 0 without wheels."""
-    craft, wheels = one.after.craft, one.after.wheels
-    if wheels is None:
+    if one.after.wheels is None:
         return 0.0
     if one.before.wheels is not None:
         return math.inf
-    rotors = np.array(one.after.rotors) @ np.array(wheels.axes)
-    return float(np.linalg.norm(rotors)) + float(np.linalg.eigvalsh(tensor(craft.inertia))[-1]) * rate
+    return float(np.linalg.norm(one.after.stored)) + _most_inertia(one) * rate
 
 
 def left_momentum(one: HandOver, rate: float) -> float:
     """Return the largest momentum (N m s) at which a switch happens at a rate (rad/s) of the body: the wheels' momentum that
     it allows plus that of the body; inf where it allows any."""
-    return one.levels.get(RELEASED, math.inf) + float(np.linalg.eigvalsh(tensor(one.after.craft.inertia))[-1]) * rate
+    return one.levels.get(RELEASED, math.inf) + _most_inertia(one) * rate
+
+
+def _most_inertia(one: HandOver) -> float:
+    return float(np.linalg.eigvalsh(tensor(one.after.craft.inertia))[-1])
 
 
 def flown_stretches(issued: Issued, run: Recording, end: int | None) -> list[Stretch]:

@@ -120,7 +120,7 @@ def study(scenario: Scenario, entry: LawEntry, source: Any, mapping: Any = None,
     inside = (steps >= 0) & (steps <= duration)
     if not inside.any():
         times = f"times from {telemetry.times[0]:g} to {telemetry.times[-1]:g} s"
-        raise InputError(telemetry.name, "", times, f"some within the scenario, 0 to {duration * loop.period:g} s")
+        raise InputError(telemetry.name, "", times, f"times within the scenario, from 0 to {duration * loop.period:g} s")
     first, last = int(steps[inside].min()), int(steps[inside].max())
     rows = np.full(last - first + 1, -1)
     # Of several samples of a control step the last one counts.

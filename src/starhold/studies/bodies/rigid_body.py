@@ -83,8 +83,9 @@ class RigidBodyStudy(BodyStudy):
     ) -> Meter:
         masses = None
         if PREMISES in extras:
-            axes = () if loop.wheels is None else loop.wheels.axes
-            masses = Masses(loop.craft.inertia, axes, (0.0,) * len(MODES) if mode_laws(loop.law, loop.gains) else ())
+            masses = Masses(
+                loop.craft.inertia, loop.wheel_axes, (0.0,) * len(MODES) if mode_laws(loop.law, loop.gains) else ()
+            )
         for extra in extras:
             if extra not in (*EXTRAS, PREMISES):
                 raise ValueError(f"{' or '.join(EXTRAS)}, not {extra}")
