@@ -14,7 +14,7 @@ from typing import Any
 
 import typer
 
-from generators.kernel import files_table
+from generators.kernel import files_table, needed_table
 from generators.laws import POINT
 from generators.lemmas import lemmas_table
 from generators.proved import beside_table, costs_table, starts_table
@@ -218,6 +218,7 @@ TABLES = {
     "roles": roles_text,
     "limits of models": limits_table,
     "kernel files": files_table,
+    "needed of the kernel": needed_table,
     "invariant sets": sets_table,
     "lemmas": lemmas_table,
     "dice": lambda: methods_table(Dice),

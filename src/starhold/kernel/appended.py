@@ -14,8 +14,9 @@ from itertools import accumulate
 from operator import mul
 from typing import NamedTuple
 
-from .loops import AXES, IS_VALID, AttitudeLoop
+from .loops import AXES, AttitudeLoop
 from .numbers import Account, Rows, added, demand, inverse, norm, plus, reach, root, scalar, shortened, times, transpose, up
+from .reading import IS_VALID
 from .regions import stretch
 from .taylor import PLACES, Model, add, beyond, multiple, multiply, negative, number, run, slope, within
 from .taylor import root as root_of

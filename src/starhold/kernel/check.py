@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, replace
+from linecache import getlines
 
-from .loops import IS_VALID
 from .numbers import Account, RefusedError, demand
-from .reading import BYTES, Claim, read_certificate
+from .reading import BYTES, IS_VALID, Claim, read_certificate
 from .rules import Obligation
 from .sentences import Statement
 from .theorems import THEOREMS
@@ -69,7 +69,7 @@ def main(arguments: list[str]) -> int:
     except (RefusedError, OSError, UnicodeDecodeError, RecursionError, MemoryError) as fault:
         print(f"refused: {' '.join(str(fault).split()) or type(fault).__name__}")
         return 1
-    print(UNREAD, *lines, sep="\n")
+    print(UNREAD, *lines, audited(), sep="\n")
     return 0
 
 
@@ -77,6 +77,14 @@ def written(proved: Proved) -> list[str]:
     """Return the lines about a claim: its statement, and the programs that it is about."""
     programs = proved.claim.programs.content.items()
     return [f"proved: {proved.statement.written()}", *(f"  {role} {program.digest}" for role, program in programs)]
+
+
+def audited() -> str:
+    """Return which files of the kernel have been loaded, all that the check depends on, and how many lines they have."""
+    loaded = {name: module for name, module in sorted(sys.modules.items()) if name.startswith(f"{__package__}.")}
+    count = sum(len(getlines(module.__file__ or "", vars(module))) for module in loaded.values())
+    names = ", ".join(name.removeprefix(f"{__package__}.") for name in loaded)
+    return f"Checked by {count} lines of the kernel: {names}."
 
 
 if __name__ == "__main__":

@@ -16,10 +16,10 @@ from functools import cached_property
 from itertools import combinations
 from typing import TypeAlias
 
-from .numbers import Rows, demand, inverse, plus, scalar
+from .numbers import Rows, beside, demand, inverse, plus, scalar
 from .polynomials import Poly, apply, cross, dot, minus, poly, total, var, variables
 from .programs import Asking, Case, Exactly, Piecewise, joined, known, positive, single
-from .reading import Claim
+from .reading import IS_VALID, Claim
 from .rules import Definite, Shown, vanish
 
 AXES = range(3)
@@ -32,8 +32,6 @@ REMEMBERS = "memory"
 """The law's memory, whatever is in it, adds a bounded torque to what it asks for without."""
 HANDED = "handed over"
 """The loop takes over from another one in any of the states that the claim says its set holds."""
-IS_VALID = "measurement.is_valid"
-"""This input tells a program whether the estimate that it is given is valid, as it is in every loop here."""
 TOLD_TORQUE = "measurement.external_torque"
 """The torque from outside that a law is told."""
 NONE = [Poly({})] * 3
@@ -299,3 +297,8 @@ def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:
 def slopes(parts: Sequence[Poly], names: Sequence[str], at: Mapping[str, Poly | Fraction | int] | None = None) -> Rows:
     """Return the derivatives with respect to variables, at a point if one is given."""
     return [[(one.at(at) if at else one).number for one in map(p.slope, names)] for p in parts]
+
+
+def over_period(feedback: Rows, h: Fraction) -> Rows:
+    """Return the linear motion of (w, q) over a period in which the acceleration -feedback (w, q) is constant."""
+    return plus(beside(scalar(1), scalar(0)), feedback, -h) + plus(beside(scalar(h / 2), scalar(1)), feedback, -h * h / 4)

@@ -7,7 +7,7 @@ from functools import reduce
 from itertools import product
 from typing import NamedTuple
 
-from .loops import AXES, NONE, RATES, AttitudeLoop, slopes
+from .loops import AXES, NONE, RATES, AttitudeLoop, over_period, slopes
 from .numbers import Rows, beside, demand, inverse, plus, scalar, times
 from .polynomials import apply, dot, var
 from .regions import STATE, with_momentum
@@ -95,8 +95,3 @@ def between(near: Near, loop: AttitudeLoop, size: Fraction) -> list[Rows]:
     """Return matrices between which A lies for each momentum of the wheels up to a size."""
     ways = [near.spun(*spinning(loop, way)) for way in scalar(size)]
     return [reduce(lambda A, one: plus(A, *one), zip(ways, corner, strict=True), near.A) for corner in AROUND]
-
-
-def over_period(feedback: Rows, h: Fraction) -> Rows:
-    """Return the linear motion of (w, q) over a period in which the acceleration -feedback (w, q) is constant."""
-    return plus(beside(scalar(1), scalar(0)), feedback, -h) + plus(beside(scalar(h / 2), scalar(1)), feedback, -h * h / 4)

@@ -15,6 +15,8 @@ FORMAT = "starhold certificate 3"
 ASIDE = {"certificates", "note", "scenario", "versions"}
 """What a certificate may hold beside proofs, and the kernel does not read."""
 BYTES, CLAIMS, NUMBERS = 8_000_000, 100, 2_000
+IS_VALID = "measurement.is_valid"
+"""This input tells a program whether the estimate that it is given is valid, as it is in every loop here."""
 _T = TypeVar("_T")
 
 

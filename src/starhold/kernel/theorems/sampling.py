@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from fractions import Fraction
 
-from ..loops import RATES, TURNS, AttitudeLoop, around, slopes
-from ..near import over_period
+from ..loops import RATES, TURNS, AttitudeLoop, around, over_period, slopes
 from ..numbers import Rows, beside, demand, inverse, plus, times
 from ..reading import Claim
 from ..rules import Contracts, Definite, Exceeds, Part, Proof, vanish
