@@ -163,7 +163,7 @@ def campaign(
         for key, value in changes.items()
     }
     options = Options(engine_of(threads, workers, scheduler, gpu), resume, force, until_decided, search, proof)
-    place = Path(passing_folder("campaign") if folder is None else folder)
+    place = Path(passing_folder() if folder is None else folder)
     return fly_campaign(with_campaign(reading.open_scenario(scenario), plain), place, law, options, progress)
 
 

@@ -96,8 +96,8 @@ def filled(package: str, template: str, values: Mapping[str, Any]) -> str:
     return re.sub(r"@(\w+)@", lambda match: str(values.get(match[1], match[0])), text)
 
 
-def passing_folder(purpose: str) -> str:
-    """Make a folder that goes when this process ends."""
-    folder = tempfile.mkdtemp(prefix=f"starhold-{purpose}-")
+def passing_folder() -> str:
+    """Make a temporary folder for a campaign, which is deleted when this process ends, and return its path."""
+    folder = tempfile.mkdtemp(prefix="starhold-campaign-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder

@@ -37,7 +37,7 @@ def misreadings(claim: Claim, loop: ClosedLoop, span: Any) -> list[NDArray[np.bo
         turned: Any = relative(tuple(span["attitude"].T), tuple(seen.T))
         return error_angle(np.transpose(turned)) > attitude
 
-    return [exceeds(x, span[f"{f.called.replace('-', '_')}_{x}"]) for f, names in measured for x in names]
+    return [exceeds(x, span[f"{f.prefix}{x}"]) for f, names in measured for x in names]
 
 
 def _largest(claim: Claim, span: Any) -> Array:

@@ -1,5 +1,5 @@
-"""Notes on the premises of a claim about a loop as it flies: the estimation errors, the momentum of body and wheels, and how
-far the torque that acts is from the command."""
+"""Notes on the premises of a claim about a loop as it flies: the estimation errors, the momentum of body and wheels, and the
+difference between the acting torque and the command."""
 
 from __future__ import annotations
 

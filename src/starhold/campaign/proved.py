@@ -39,9 +39,9 @@ from starhold.studies.body import Issued, study_of
 Array = NDArray[np.float64]
 Notice = Callable[..., None]
 MOST, BLOCK = 20_000, 512
-"""Runs of a campaign that are compared with the claim, from the first on, and those of a block."""
+"""The largest number of runs of a campaign that are compared with a claim, and the number of runs in a block."""
 APART = 1_000
-"""Runs that are compared where each has a loop of its own."""
+"""The largest number of runs that are compared if each run has a loop of its own."""
 SLACK = 1e-6
 """The share of a bound by which the integration may take a flight beyond it, or beyond a premise."""
 NEARLY = 0.9

@@ -16,7 +16,7 @@ from starhold.campaign.job import Job, Source
 from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.studies import budget as budgets
-from starhold.studies.body import study_of
+from starhold.studies.body import SILENT, Notice, study_of
 from starhold.studies.compare import fly_law
 from starhold.studies.deciding import (
     Verdicts,
@@ -48,8 +48,6 @@ if TYPE_CHECKING:
     from starhold.studies.budget import Budget
     from starhold.studies.flight import Flight
 
-Notice = Callable[[int, int, str], None]
-SILENT: Notice = lambda done, total, what: None  # noqa: E731
 Known = TypeVar("Known")
 OTHER_BODY = "it is available for rigid bodies only"
 

@@ -62,11 +62,10 @@ def recorded_states(loop: ClosedLoop, arrays: Mapping[str, Any]) -> Any:
     for fitted, start in zip(loop.used("effector"), loop.carry().effectors, strict=True):
         record = fitted.part.hook("record")
         # Names that occurred before begin with that of the part.
-        called = fitted.called.replace("-", "_")
         count = iter(range(1, 1 + len(list(leaves(start)))))
         state = mapped(start, lambda _, count=count: 1e-3 * next(count))
         sample = None if record is None else record(state, (), loop.start, fitted.prepared(loop.period))
-        names = [] if sample is None else [f"{called}_{x}" if x in taken else x for x in sample._fields]
+        names = [] if sample is None else [f"{fitted.prefix}{x}" if x in taken else x for x in sample._fields]
         taken |= {*names}
         if fitted not in appendages(loop):
             continue

@@ -60,7 +60,7 @@ def assumption(identifier: str) -> Assumption:
         age = float(identifier.removeprefix(FRESH))
 
         def aged(span: Any) -> Unmet:
-            names = (f"{fitted.called.replace('-', '_')}_{AGE}" for fitted in span.loop.used("estimator"))
+            names = (f"{fitted.prefix}{AGE}" for fitted in span.loop.used("estimator"))
             # Ages are sums of control periods.
             return [(span[name] > age * MORE + NEAR, "directions give no attitude") for name in names]
 
@@ -162,7 +162,7 @@ def _told(span: Any) -> Unmet:
 
 
 def _unsure(span: Any) -> Unmet:
-    names = (f"{fitted.called.replace('-', '_')}_{IS_VALID}" for fitted in span.loop.used("estimator"))
+    names = (f"{fitted.prefix}{IS_VALID}" for fitted in span.loop.used("estimator"))
     return [(span[name] < 0.5, "the estimate is not valid") for name in names]
 
 

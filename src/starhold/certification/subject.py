@@ -68,7 +68,7 @@ class Subject:
 
     @property
     def off(self) -> float:
-        """A bound of the norm of the inertia's error (kg m2)."""
+        """A bound on the norm of the inertia error (kg m2)."""
         return (self.tolerance or 0.0) * float(np.trace(tensor(self.loop.craft.inertia))) * (1.0 + 1e-12)
 
     def envelope(self, noisy: bool) -> Envelope:
@@ -219,7 +219,7 @@ def _momentum(loop: ClosedLoop, target_rate: Any, stored: float) -> float:
     """Norm of the total angular momentum at the start or at rest on target, whichever is more, rounded up (N m s), with no
     more than `stored` in the wheels and a part more for what torques add until a mode ends."""
     inertia = tensor(loop.craft.inertia)
-    begun = inertia @ loop.start.rate + np.array(loop.rotors) @ np.array(cast(Wheels, loop.wheels).axes)
+    begun = inertia @ loop.start.rate + loop.stored
     still = float(np.linalg.eigvalsh(inertia)[-1]) * above(target_rate)
     return max(min(float(np.linalg.norm(begun)), stored * (1.0 + GATHERED) + still), still) * (1.0 + 1e-12)
 

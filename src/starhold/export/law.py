@@ -125,7 +125,7 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
             # Without an estimator, attitude and rate are inputs.
             taken = [name for name in first if parts.estimator is not None or name in parts.law.reads]
             repeated = not firsts.keys().isdisjoint(taken)
-            inputs = {name: f"{sensor.called.replace('-', '_')}_{name}" if repeated else name for name in taken}
+            inputs = {name: f"{sensor.prefix}{name}" if repeated else name for name in taken}
             again += [inputs] if repeated else []
             firsts |= {} if repeated else inputs
             readings.update({inputs[name]: first[name] for name in taken})

@@ -108,7 +108,7 @@ class Reads(Recorder):
         return self._marked(like)
 
     def read(self, out: Any) -> set[Any]:
-        """Return the fields on which the results of a program depend: pairs of a class and a name."""
+        """Return the fields on which the results of a program depend, as pairs of class and name."""
         live = {leaf.ref for leaf in leaves(self._marked(out)) if isinstance(leaf, Handle)}
         block, read, before = tuple(self._open[0]), set[Any](), -1
         # All structs of a class must have the same members.

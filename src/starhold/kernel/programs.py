@@ -91,7 +91,7 @@ class Case:
 
     @property
     def known(self) -> list[Poly]:
-        """Return what is not negative where the case holds, and on the border of that."""
+        """Return the polynomials that are not negative where the case holds, boundary included."""
         return [Poly(dict(p)) * (1 if above else -1) for p, above in sorted(self.guards)]
 
     def agrees(self, other: Case) -> bool:

@@ -313,6 +313,11 @@ def make_law(modes: Modes) -> Law:
     return Law(NAME, module)
 
 
+def names_of_modes(law: Law) -> list[str]:
+    """Return the names of a law's modes; none for a law without modes."""
+    return [mode.name for mode in law.module.modes] if isinstance(law.module, Modes) else []
+
+
 def mode_laws(law: Law, gains: Any) -> list[tuple[str, Law, Any]]:
     """Return name, law and gains of each mode of a law; none for a law without modes."""
     if not isinstance(law.module, Modes):

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.structure import alike, leaves
@@ -216,6 +217,16 @@ class ClosedLoop:
         return () if fitted is None else fitted.start.momentum
 
     @property
+    def wheel_axes(self) -> tuple[Vector, ...]:
+        """The spin axes of the reaction wheels (body); none without wheels."""
+        return () if self.wheels is None else self.wheels.axes
+
+    @property
+    def stored(self) -> NDArray[np.float64]:
+        """The angular momentum (3,) of the rotors at the start (body, N m s); zero without wheels."""
+        return np.array(self.rotors) @ np.reshape(self.wheel_axes, (-1, 3))
+
+    @property
     def target(self) -> Fitted:
         """The target; the inertial axes by default."""
         return next(iter(self.used("target")), ON_TARGET)
@@ -296,6 +307,10 @@ class ClosedLoop:
             prepared("actuator"),
             prepared("watcher"),
         )
+
+    def after(self, event: Event) -> Self:
+        """Return the loop as it is from an event on, without further events."""
+        return replace(self, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
 
     def phases(self, steps: int) -> list[Phase]:
         """Return the phases of a run of `steps` control steps, divided at the events."""

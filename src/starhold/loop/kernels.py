@@ -99,10 +99,10 @@ def _sizes(rows: Any) -> tuple[tuple[int, bool], ...]:
     return tuple((k, copysign(1.0, x) != copysign(1.0, numbers[k])) for k, x in zip(firsts, numbers, strict=True))
 
 
-def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
+def fly_plainly(loop: ClosedLoop, steps: int) -> Any:
     """Return the carry of a loop without events after `steps` control steps in plain Python."""
     step, carry, setup = make_step(loop.composition()), loop.carry(), loop.setup()
-    key = (loop.seed, loop.run if run is None else run)
+    key = (loop.seed, loop.run)
     for k in range(steps):
         carry = step.update(step.check(carry, k, setup), k, key, loop.gains, loop.known, setup)
         for _ in range(loop.substeps):

@@ -28,9 +28,7 @@ EPHEMERIS = Parameter(
     shared="orbit.ephemeris",
 )
 """The declaration of the choice, common to all parts; a scenario gives it to all of them."""
-SOURCES = (
-    "VSOP87 (Bretagnon and Francou 1988), ELP-2000/82 (Chapront-Touze and Chapront 1983) where `precise` is asked for",
-)
+SOURCES = ("VSOP87 (Bretagnon and Francou 1988), ELP-2000/82 (Chapront-Touze and Chapront 1983) with `precise`",)
 CENTURY = 36525.0
 Turning: TypeAlias = tuple[Scalar, Scalar]
 """Cosine and sine of an angle."""

@@ -109,6 +109,11 @@ class Fitted:
         return self.name or self.part.name
 
     @property
+    def prefix(self) -> str:
+        """The beginning of the names of its recorded quantities, where those would not be unique without it."""
+        return f"{self.called.replace('-', '_')}_"
+
+    @property
     def needs(self) -> tuple[str, ...]:
         """Names of other parts of the loop, or readings, that it needs with these parameters."""
         tell = self.part.hook("needs")
@@ -121,7 +126,7 @@ class Fitted:
         return self.part.about if tell is None else tell(self.params)
 
     def prepared(self, period: float) -> Any:
-        """Return its parameters in the form that equations take, for a control period (s)."""
+        """Return its parameters in the form that its equations take, for a control period (s)."""
         make = self.part.hook("prepare")
         return self.params if make is None else make(self.params, period)
 

@@ -126,8 +126,7 @@ def unsure(flights: Sequence[Flight]) -> tuple[tuple[float, float], ...]:
 
 def readers_of(scenario: Scenario) -> tuple[str, ...]:
     """Return the prefixes of the names of quantities that sensors and estimators output."""
-    readers = [fitted.called for fitted in scenario.parts if fitted.part.role in ("sensor", "estimator")]
-    return tuple(f"{name.replace('-', '_')}_" for name in readers)
+    return tuple(fitted.prefix for fitted in scenario.parts if fitted.part.role in ("sensor", "estimator"))
 
 
 def steps_within(flight: Flight, kind: str) -> list[int | None]:

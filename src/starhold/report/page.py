@@ -21,6 +21,7 @@ from starhold.report.plots import colour
 from starhold.report.proved import section as proved
 from starhold.report.settings import settings, with_units
 from starhold.report.tables import note
+from starhold.report.text import pretty_unit
 from starhold.scenario.checking import read_toml
 from starhold.scenario.quantity import LEAST, MOST, declared
 from starhold.scenario.reading import Scenario
@@ -88,7 +89,7 @@ def _dial(made: Reflight, key: str) -> dict[str, Any]:
     item = made.gains.get(key)
     gain = _declared(made.scenario, key) if item is None else item.gain
     bounds = {"above": gain.above, "least": gain.at_least, "most": gain.at_most}
-    unit = "" if gain.unit == "1" else gain.unit.replace("^2", "²")
+    unit = "" if gain.unit == "1" else pretty_unit(gain.unit)
     dial: dict[str, Any] = {"key": key, "value": made.dials[key], "unit": unit} | bounds
     if item is None:
         dial["degrees"] = unit.startswith("rad") and "deg" in _written(made.scenario, key, made.dials[key])

@@ -338,7 +338,7 @@ def _certificates(review: Review) -> Iterator[Piece]:
 
 def _credibility(review: Review) -> Iterator[Piece]:
     """Yield the evidence for each factor of NASA-STD-7009; people assign the levels."""
-    yield "The factors are those of NASA-STD-7009; assigning levels is left to people."
+    yield "The factors are those of NASA-STD-7009; this review assigns no levels."
     factors = factors_of(review, _issued(review))
     rows = [[name, " ".join(known) or "nothing", " ".join(blank)] for name, (known, blank) in factors.items()]
     yield _table("factor|known|not stated", rows)

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from starhold.report.tables import listed, titled
-from starhold.report.text import number_text
+from starhold.report.text import number_text, pretty_unit
 from starhold.scenario.checking import read_toml
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> st
                     text = with_units(texts.get(name_within), number) or _value(number)
                     rows.append((f"{key}.{name_within}", text, ""))
         elif value is not None:
-            meaning = str(properties.get(key, {}).get("description", "")).replace("^2", "²").replace("^3", "³")
+            meaning = pretty_unit(str(properties.get(key, {}).get("description", "")))
             rows.append((key, (with_units(written.get(key), value) or _value(value)) + given, meaning))
     return titled(name.replace("_", " "), listed(rows))
 

@@ -108,5 +108,5 @@ def plain_measure(name: str, unit: str, meaning: str = "") -> Measure:
 
 
 def pretty_unit(unit: str) -> str:
-    """Return a unit with superscript exponents."""
+    """Return a unit, or a text with units, with superscript exponents."""
     return unit.replace("^2", "²").replace("^3", "³")

@@ -181,7 +181,7 @@ def with_orbit(data: Mapping[str, Any], folder: Path, where: str) -> Mapping[str
 
 def say_distance(scenario: Scenario) -> None:
     """Warn how far the flown motion departs from the motion in the file that [orbit] names, if any."""
-    orbit = getattr(scenario.table, "orbit", None)
+    orbit = scenario.orbit
     kind = next((kind for kind in KINDS if getattr(orbit, kind, None) is not None), None)
     if orbit is None or kind is None:
         return

@@ -219,7 +219,7 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
         reads.append(read_gains(one, scenario, context, place, ModeTable, whole=table))
     tables = [read.table for read in reads]
     on_loss = _mode_on_loss(table, [one.name for one in tables], where, key)
-    epoch = getattr(getattr(scenario.table, "orbit", None), "epoch", None)
+    epoch = scenario.orbit and scenario.orbit.epoch
     clock = Clock(epoch, scenario.table.simulation.duration)
     modes, gains = _joined(tables, reads, on_loss, clock, where, key)
     monitors = tuple(

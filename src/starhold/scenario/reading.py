@@ -8,7 +8,7 @@ from functools import cached_property
 from importlib import resources
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError, expect, shortly
 from starhold.laws.catalogue import Law
@@ -25,6 +25,9 @@ from starhold.scenario.parts import read_parts
 from starhold.scenario.requirement_files import with_files
 from starhold.scenario.schema import APART
 from starhold.scenario.writing import toml_text
+
+if TYPE_CHECKING:
+    from starhold.scenario.orbit import Orbit
 
 LONGEST_PATH = 200
 """The most characters of a path in errors."""
@@ -92,6 +95,11 @@ class Scenario:
         return self.made.craft
 
     @property
+    def orbit(self) -> Orbit | None:
+        """The [orbit] table; None without one."""
+        return getattr(self.table, "orbit", None)
+
+    @property
     def known(self) -> Scenario:
         """The scenario that laws assume and are designed for: the nominal one, or this one."""
         return self.supposed or self
@@ -111,7 +119,7 @@ class Scenario:
         s"}. The table of a law or part is found by its name, or by its number as "law[1]"; None removes a key. InputError
         as for a file."""
         other = changed(self, changes)
-        flown, before = ((getattr(s.table, "orbit", None), s.parts, s.table.simulation.duration) for s in (other, self))
+        flown, before = ((s.orbit, s.parts, s.table.simulation.duration) for s in (other, self))
         if flown != before:
             say_distance(other)
         return other

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from types import MappingProxyType
@@ -26,6 +26,11 @@ Cones: TypeAlias = Mapping[str, Any]
 NO_CONES: Cones = MappingProxyType({})
 Values: TypeAlias = dict[str, tuple[Any, str]]
 """Values and their units ("1" for dimensionless), by name."""
+
+
+Notice: TypeAlias = Callable[[int, int, str], None]
+"""Called with the number of items done, their total, and the name of the next one."""
+SILENT: Notice = lambda done, total, name: None  # noqa: E731
 
 
 class Issued(NamedTuple):

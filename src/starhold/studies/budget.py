@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -43,6 +43,7 @@ from starhold.parts.part import Fitted
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.simulation.lanes import RunningBatch, ThreadPool, carry_columns
+from starhold.studies.body import SILENT, Notice
 from starhold.studies.requirements import Requirement, at_most, tables_of
 from starhold.trace.machine import widest
 
@@ -161,9 +162,7 @@ class Source(NamedTuple):
     without: Mapping[str, Any]
 
 
-def study(
-    scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
-) -> Budget:
+def study(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> Budget:
     """Return the pointing error budget of a law of a scenario, from flights without any error source, with each source
     alone, and with all of them, always without faults. A source's contribution is the difference, run by run and instant by
     instant, between the errors with this source and without any. `notice` is called with the number done, the total, and the

@@ -16,6 +16,7 @@ from starhold.certification.hand_over import flown_ends, misjudged
 from starhold.certification.matrices import above
 from starhold.certification.subject import make_subject
 from starhold.certification.wording import listed
+from starhold.laws.modes import names_of_modes
 from starhold.studies.body import Issued
 from starhold.studies.modes import RELEASED, STORED, HandOver, fresh_momentum, hand_overs, left_momentum
 
@@ -65,7 +66,7 @@ def bounded(rate: float, angle: float, *more: str) -> str:
 def links_of(loop: ClosedLoop, name: str, certificates: Mapping[str, Certificate]) -> list[Link]:
     """Return the links of a law's modes, starting with the first mode, from the certificates of the modes and switches by
     name; switches back are not links. A mode with two claims has two links to the next one."""
-    modes = [mode.name for mode in loop.law.module.modes]  # pyright: ignore[reportAttributeAccessIssue]
+    modes = names_of_modes(loop.law)
     flown: dict[str, Claim | None] = {mode: _flown(certificates.get(f"{name}: {mode}")) for mode in modes}
     switches = [one for one in hand_overs(loop, name) if one.key == "until"]
     links, reached = list[Link](), set[tuple[int, str, bool]]()

@@ -11,11 +11,12 @@ from starhold.analysis.margins import margins
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
 from starhold.certification.wording import angle, enumerated, sentence
 from starhold.errors import InputError
+from starhold.laws.modes import names_of_modes
 from starhold.scenario.checking import show
 from starhold.studies.body import study_of
 from starhold.studies.budget import TOGETHER
 from starhold.studies.requirements import Requirement, at_most, read_requirements, tables_of, times_of
-from starhold.studies.verification import RequirementVerdict, check_modes, compared, limits, mode_names, undecided
+from starhold.studies.verification import RequirementVerdict, check_modes, compared, limits, undecided
 
 if TYPE_CHECKING:
     from starhold.analysis.linear import Linear
@@ -107,7 +108,7 @@ def _proved(
     """Return the verdict from the claim that meets the limit and leaves out the least, else from the smallest bound, else
     the reason why there is none."""
     _, kind, name = BOUNDS[required.metric]
-    modes, place = mode_names(entry), None
+    modes, place = names_of_modes(entry.law), None
     if modes and table.in_mode is None:
         return undecided(table, f"claims are about single modes: in_mode = {modes[0]}", **limits(table, required))
     place = modes.index(str(table.in_mode)) + 1 if modes else None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, TypeAlias
@@ -24,6 +23,7 @@ from starhold.scenario.designing import written
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import fly, label
 from starhold.studies.bodies.rigid_body import certify_law
+from starhold.studies.body import SILENT, Notice
 from starhold.studies.pointing import ProvedPointing, prove_pointing
 from starhold.studies.requirements import orbit_of
 from starhold.synthesis.stability_degree import degree, scale
@@ -97,7 +97,7 @@ class Failure:
 def study(
     scenario: Scenario,
     entry: LawEntry,
-    notice: Callable[[int, int, str], None] = lambda done, total, name: None,
+    notice: Notice = SILENT,
     proof: bool = False,
 ) -> list[Failure]:
     """Fly the intact set and every single and double loss of wheels, with one law and without the scenario's faults; return
@@ -192,7 +192,8 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         if not faults:
             raise
         return replace(failure, refused=error.allowed)
-    gains = loop.events[-1].gains if loop.events else loop.gains
+    # The loss occurs at time 0, and the law knows of it.
+    flown = loop.after(loop.events[-1]) if loop.events else loop
     period = orbit_of(scenario)
     every, steps = table.simulation.record_every, _steps(scenario, loop, period)
     samples, carry = fly(loop, steps, every)
@@ -208,8 +209,8 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         known = replace(known, wheel=working[known.wheel - 1] + 1)
     return replace(
         failure,
-        gains=written(entry.law.fields(), gains),
-        eta=_degree(scenario, entry, gains),
+        gains=written(entry.law.fields(), flown.gains),
+        eta=_degree(scenario, entry, flown.gains),
         settling=metrics["settling_time"],
         diverged_at=lost_at,
         certified=_certified(scenario, entry, loop),
@@ -217,16 +218,8 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         momentum_share=float(np.abs(filled).max()),
         flown=float(recording["time"][-1]),
         orbit=period,
-        proof=failure.proof and prove_pointing(scenario, _after(loop)),
+        proof=failure.proof and prove_pointing(scenario, flown),
     )
-
-
-def _after(loop: ClosedLoop) -> ClosedLoop:
-    """Return the loop after the loss, which its law knows."""
-    if not loop.events:
-        return loop
-    last = loop.events[-1]
-    return replace(loop, events=(), craft=last.craft, gains=last.gains, parts=last.parts)
 
 
 def _certified(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> tuple[float, float] | None:

@@ -261,12 +261,12 @@ def _readings(loop: ClosedLoop) -> tuple[tuple[Reading, ...], int]:
     carry = loop.carry()
     for fitted, memory, params in zip(loop.used("sensor"), carry.memories.sensors, setup.sensors, strict=True):
         reading = fitted.part.module.measure(carry.state, memory, params, Silent(), 0)[0]
-        where, prefix = dict[str, tuple[int, int]](), fitted.called.replace("-", "_")
+        where = dict[str, tuple[int, int]]()
         for name, value in reading._asdict().items():
             where[name] = row, len(flatten((value,)))
             row += where[name][1]
         for name, (first, size) in where.items():
-            gates = tuple((f"{prefix}_{n}", place) for n, (place, _) in where.items() if n.startswith(f"{name}_is_"))
+            gates = tuple((f"{fitted.prefix}{n}", place) for n, (place, _) in where.items() if n.startswith(f"{name}_is_"))
             if not any(name.startswith(f"{other}_is_") for other in where):
-                readings.append(Reading(f"{prefix}_{name}", first, size, gates))
+                readings.append(Reading(f"{fitted.prefix}{name}", first, size, gates))
     return tuple(readings), row

@@ -1,9 +1,8 @@
 """Searches for the roots of the modal law that slew fastest within a scenario's limits, and fits the results."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +13,8 @@ from starhold.errors import InputError
 from starhold.scenario.bodies.rigid_body.transient import TransientTable
 from starhold.scenario.building import build
 from starhold.scenario.reading import LawEntry, Scenario
+from starhold.studies.body import SILENT, Notice
 
-Notice: TypeAlias = Callable[[int, int, str], None]
 DIGITS = 6
 """The number of printed digits of the fit; the roots have three or four."""
 PUBLISHED_FOR: dict[str, Any] = {
@@ -71,7 +70,7 @@ def pick_modal(scenario: Scenario, law: str | None) -> LawEntry:
     return entry
 
 
-def study(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, total, what: None) -> Study:
+def study(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> Study:
     """Return the results of a scenario's search, with a law from `pick_modal`, of which only b matters. `notice` is called
     with the number of angles done. InputError where no root keeps within the limits from some angle."""
     table: Any = scenario.table.transient

@@ -11,7 +11,7 @@ import numpy as np
 
 from starhold.analysis.mode_notes import Span, span
 from starhold.laws.conditions import Facts, Sight, Watch, needs_sky, sky_at, station_at
-from starhold.laws.modes import Modes, Switch
+from starhold.laws.modes import Modes, Switch, names_of_modes
 from starhold.loop.modes import loop_of_mode
 from starhold.parts.craft import tensor
 from starhold.parts.epoch import Date, date_after
@@ -125,22 +125,22 @@ def _holds(test: str, given: dict[str, Any], watch: Any, run: Recording, place: 
 
 def epoch_of(scenario: Scenario, law: Law) -> Date | None:
     """Return the epoch of a flight whose law has conditions on dates, stations or the Sun; None for other laws."""
-    dated = isinstance(law.module, Modes) and law.module.WATCHES and hasattr(scenario.table, "orbit")
-    return scenario.table.orbit.epoch if dated and scenario.table.orbit is not None else None
+    dated = isinstance(law.module, Modes) and law.module.WATCHES
+    return scenario.orbit.epoch if dated and scenario.orbit is not None else None
 
 
 def begins_asked(scenario: Scenario, law: Law) -> dict[str, int]:
     """Return the modes of a law, counted from 1, whose first beginning is required in campaigns, by the requirements'
     columns."""
     tables = [one for one in scenario.table.requirement if one.metric == BEGINS and one.method == "campaign"]
-    names = [mode.name for mode in law.module.modes] if isinstance(law.module, Modes) else []
+    names = names_of_modes(law)
     return {column_of(one): names.index(str(one.in_mode)) + 1 for one in tables if one.in_mode in names}
 
 
 def parts_asked(scenario: Scenario, law: Law) -> dict[str, tuple[str, Span]]:
     """Return the error and the part of a flight in which campaigns must bound it, by the requirements' columns. InputError
     for times that are invalid or outside the flight."""
-    names = [mode.name for mode in law.module.modes] if isinstance(law.module, Modes) else []
+    names = names_of_modes(law)
     timing, parts = scenario.table.simulation, dict[str, tuple[str, Span]]()
     for key, table in tables_of(scenario, "campaign").items():
         if is_of_a_part(table) and (table.in_mode is None or table.in_mode in names):
@@ -240,19 +240,21 @@ def most_stored(loop: ClosedLoop, place: int, rate: float = 0.0) -> float:
 def fresh_momentum(one: HandOver, rate: float) -> float:
     """Return the largest momentum (N m s) with which a mode begins at this rate (rad/s) after a mode with inactive wheels,
     whose rotors keep their momentum; inf after any other mode, and 0 without wheels."""
-    craft, wheels = one.after.craft, one.after.wheels
-    if wheels is None:
+    if one.after.wheels is None:
         return 0.0
     if one.before.wheels is not None:
         return math.inf
-    rotors = np.array(one.after.rotors) @ np.array(wheels.axes)
-    return float(np.linalg.norm(rotors)) + float(np.linalg.eigvalsh(tensor(craft.inertia))[-1]) * rate
+    return float(np.linalg.norm(one.after.stored)) + _most_inertia(one) * rate
 
 
 def left_momentum(one: HandOver, rate: float) -> float:
     """Return the largest momentum (N m s) at which a switch happens at a rate (rad/s) of the body: the wheels' momentum that
     it allows plus that of the body; inf where it allows any."""
-    return one.levels.get(RELEASED, math.inf) + float(np.linalg.eigvalsh(tensor(one.after.craft.inertia))[-1]) * rate
+    return one.levels.get(RELEASED, math.inf) + _most_inertia(one) * rate
+
+
+def _most_inertia(one: HandOver) -> float:
+    return float(np.linalg.eigvalsh(tensor(one.after.craft.inertia))[-1])
 
 
 def flown_stretches(issued: Issued, run: Recording, end: int | None) -> list[Stretch]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from starhold.certification.certify import certify
 from starhold.certification.wording import sentence, strongest
 from starhold.laws.modes import mode_laws
 from starhold.studies.bodies.rigid_body import wanted_of
+from starhold.studies.body import SILENT, Notice
 from starhold.studies.budget import Budget, faultless, sources, study, without
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import LawEntry, Scenario
 
-Notice: TypeAlias = Callable[[int, int, str], None]
 FOUND = ("level", "highest", "end.angle", "end.rate", "settling")
 """The numbers of a claim that the search for the others determines."""
 
@@ -88,7 +88,7 @@ def prove_pointing(
     )
 
 
-def budget_with_proof(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, total, name: None) -> Budget:
+def budget_with_proof(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> Budget:
     """Return the budget of a law with the proved pointing bound and the share of each source; each proof takes seconds.
     `notice` is called with the number done, the total, and the next item."""
     budget, flown = study(scenario, entry, notice), faultless(scenario)

@@ -120,7 +120,7 @@ def study(scenario: Scenario, entry: LawEntry, source: Any, mapping: Any = None,
     inside = (steps >= 0) & (steps <= duration)
     if not inside.any():
         times = f"times from {telemetry.times[0]:g} to {telemetry.times[-1]:g} s"
-        raise InputError(telemetry.name, "", times, f"some within the scenario, 0 to {duration * loop.period:g} s")
+        raise InputError(telemetry.name, "", times, f"times within the scenario, from 0 to {duration * loop.period:g} s")
     first, last = int(steps[inside].min()), int(steps[inside].max())
     rows = np.full(last - first + 1, -1)
     # Of several samples of a control step the last one counts.
@@ -180,8 +180,8 @@ def _whole(numbers: Array) -> NDArray[np.bool_]:
 def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], telemetry: Telemetry) -> tuple[Any, list[str]]:
     """Return the readings of all sensors at each control step, and sentences on how often each is recorded. A missing
     reading is marked as not new if its sensor has such a flag, and else interpolated linearly."""
-    sensors = [fitted.called.replace("-", "_") for fitted in loop.used("sensor")]
-    wanted = {f"{s}_{n}": n for s, reading in zip(sensors, like, strict=True) for n in reading._fields}
+    sensors = loop.used("sensor")
+    wanted = {f"{s.prefix}{n}": n for s, reading in zip(sensors, like, strict=True) for n in reading._fields}
     flags = {name for name, field in wanted.items() if "_is_" in field}
     if missing := [name for name in wanted if name not in values and name not in flags]:
         allowed = "every reading of the scenario's sensors: leave out the parts that the satellite lacks"
@@ -233,17 +233,17 @@ def _effector_names(loop: ClosedLoop) -> dict[tuple[int, str], str]:
 
 def _comparisons(loop: ClosedLoop, run: Recording, values: dict[str, Array], share: float) -> Iterator[Comparison]:
     """Yield the comparisons of all quantities that are both computed and recorded."""
-    estimators = [fitted.called.replace("-", "_") for fitted in loop.used("estimator")]
-    sensors = tuple(f"{fitted.called.replace('-', '_')}_" for fitted in loop.used("sensor"))
+    estimators = tuple(fitted.prefix for fitted in loop.used("estimator"))
+    sensors = tuple(fitted.prefix for fitted in loop.used("sensor"))
     given = {*loop.body.module.Sample._fields, *_effector_names(loop).values()} - {"command"}
     passed = (*sensors, *(f"{name}_deviation" for name in run.columns))
     pairs = [(n, n) for n in run.columns if n in values and n not in given and not n.startswith(passed)]
     for one in estimators:
         # The satellite's own estimates of its attitude and rate.
-        if not any(name.startswith(f"{one}_") for name in values):
-            pairs = [(f"{one}_{n}", n) for n in ("attitude", "rate") if n in values] + pairs
+        if not any(name.startswith(one) for name in values):
+            pairs = [(f"{one}{n}", n) for n in ("attitude", "rate") if n in values] + pairs
     # Causes come before their effects.
-    pairs.sort(key=lambda pair: not pair[0].startswith(tuple(f"{one}_" for one in estimators)))
+    pairs.sort(key=lambda pair: not pair[0].startswith(estimators))
     for name, against in pairs:
         there = _whole(values[against])
         seen, computed = values[against][there], run[name].reshape(len(run["time"]), -1)[there]
@@ -270,7 +270,7 @@ def _deviation(loop: ClosedLoop, run: Recording, name: str) -> Array | None:
     if f"{name}_deviation" in run.columns:
         return np.linalg.norm(run[f"{name}_deviation"], axis=1)
     prefix, _, field = name.rpartition("_")
-    if prefix not in [fitted.called.replace("-", "_") for fitted in loop.used("estimator")]:
+    if f"{prefix}_" not in [fitted.prefix for fitted in loop.used("estimator")]:
         return None
     measured = [(f, f.part.hook("noise")) for f in loop.used("sensor") if field in f.part.module.Reading._fields]
     noises = [make(fitted.params, loop.period) for fitted, make in measured if make is not None]

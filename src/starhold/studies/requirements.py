@@ -152,7 +152,7 @@ def times_of(scenario: Scenario, key: str, table: RequirementTable, duration: fl
 
 def orbit_of(scenario: Scenario) -> float | None:
     """Return the orbital period (s) of a scenario; None without a closed orbit."""
-    orbit = getattr(scenario.table, "orbit", None)
+    orbit = scenario.orbit
     if orbit is None:
         return None
     position, velocity = orbit.start

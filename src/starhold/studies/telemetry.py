@@ -92,7 +92,7 @@ def quantities_of(loop: ClosedLoop) -> Known:
     for fitted, reading in zip(loop.used("sensor"), sensed_of(loop)[1], strict=True):
         for name, value in {} if is_recorded(fitted.part) else reading._asdict().items():
             meant = known[name][0]._replace(text=f"{name} as {fitted.called} measures it")
-            known[f"{fitted.called.replace('-', '_')}_{name}"] = meant, len(flatten((value,)))
+            known[f"{fitted.prefix}{name}"] = meant, len(flatten((value,)))
     return known
 
 
@@ -157,7 +157,7 @@ def _columns(
 
 def _epoch(scenario: Scenario) -> float | None:
     """Return the start of a scenario's flight, UTC in s since 1970; None where it states no epoch."""
-    epoch = getattr(getattr(scenario.table, "orbit", None), "epoch", None)
+    epoch = scenario.orbit and scenario.orbit.epoch
     return None if epoch is None else float(np.datetime64(iso_text(epoch), "us").astype(float)) * 1e-6
 
 

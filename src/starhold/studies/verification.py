@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from starhold.errors import InputError
-from starhold.laws.modes import Modes
+from starhold.laws.modes import names_of_modes
 from starhold.scenario.building import build
 from starhold.scenario.checking import nearest, show
 from starhold.scenario.requirement import BEGINS
@@ -176,15 +176,9 @@ def check_flight(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]
     return read_requirements(tables, meter.units, scenario.where, orbit_of(scenario))
 
 
-def mode_names(entry: LawEntry) -> list[str]:
-    """Return the names of a law's modes, if any."""
-    module: Any = entry.law.module
-    return [mode.name for mode in module.modes] if isinstance(module, Modes) else []
-
-
 def check_modes(scenario: Scenario, entry: LawEntry, tables: Mapping[str, RequirementTable]) -> None:
     """Raise InputError where a requirement names a mode that the law does not have."""
-    names = mode_names(entry)
+    names = names_of_modes(entry.law)
     for key, table in tables.items():
         if table.in_mode is not None and table.in_mode not in names:
             allowed = nearest(table.in_mode, names) if names else f"no mode, because the law {entry.name} has none"
@@ -199,7 +193,7 @@ def by_flight(scenario: Scenario, entry: LawEntry, run: Recording) -> dict[str, 
     study, cones = study_of(scenario.body), cones_of(tables.values())
     measured: dict[Any, list[dict[str, Any]]] = {}
     decided: dict[str, RequirementVerdict] = {}
-    modes = mode_names(entry)
+    modes = names_of_modes(entry.law)
     for (key, table), required in zip(tables.items(), check_flight(scenario, entry), strict=True):
         about = times_of(scenario, key, table), modes.index(table.in_mode) + 1 if table.in_mode else None
         if table.metric == BEGINS:

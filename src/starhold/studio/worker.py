@@ -6,7 +6,7 @@ import shutil
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from html import escape
 from multiprocessing.connection import Connection
@@ -20,14 +20,13 @@ from starhold.studio.apart import begin
 
 if TYPE_CHECKING:
     from starhold.campaign.worst import Sought
+    from starhold.studies.body import Notice
 
 PULSE = 0.2
 """The least time (s) between two reports of progress."""
 
-Tell = Callable[[int, int, str], None]
 
-
-def _compare(scenario: Scenario, folder: Path, tell: Tell) -> str:
+def _compare(scenario: Scenario, folder: Path, tell: Notice) -> str:
     from starhold.report.results import write_results
     from starhold.studies.compare import compare
 
@@ -35,7 +34,7 @@ def _compare(scenario: Scenario, folder: Path, tell: Tell) -> str:
     return write_results(scenario, flights, folder).name
 
 
-def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
+def _certify(scenario: Scenario, folder: Path, tell: Notice) -> str:
     from starhold.report.answer import proofs
     from starhold.report.page_parts import fold
     from starhold.report.proved import section
@@ -59,7 +58,7 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
     return _document(scenario, folder, [proofs(flights), fold("Proofs", section(flights))])
 
 
-def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
+def _studied(name: str, scenario: Scenario, folder: Path, tell: Notice) -> str:
     """Run a study and write its page with the picture, the text, and links to the files; return the page's name."""
     from starhold.report.document import block_html
     from starhold.report.figures import address
@@ -80,7 +79,7 @@ def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
     return _document(scenario, folder, parts, pill(result.outcome.replace("undecided", "not decided")) if judged else "")
 
 
-def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
+def _export(scenario: Scenario, folder: Path, tell: Notice) -> str:
     from starhold.api import export_c
 
     parts: list[str] = []
@@ -112,7 +111,7 @@ def _document(scenario: Scenario, folder: Path, parts: list[str], answer: str = 
     return "report.html"
 
 
-def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Tell) -> str:
+def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Notice) -> str:
     from starhold.campaign.again import fly_again
     from starhold.report.results import write_results
 
@@ -121,7 +120,7 @@ def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Tell) -> str:
     return write_results(again.scenario, [again.flight], folder).name
 
 
-def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
+def _campaign(scenario: Scenario, folder: Path, tell: Notice) -> str:
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
     from starhold.report.campaign_page import write_campaign

@@ -148,7 +148,7 @@ def riccati_residual(p: Array, inertia: Array, q: Array, r: Array) -> float:
 
 
 def linear_modes(inertia: Array, feedback: Array) -> NDArray[np.complexfloating[Any]]:
-    """Return eigenvalues (6,) of the motion near rest on target under u = -feedback x (1/s), the slowest first."""
+    """Return the eigenvalues (6,), in 1/s, slowest first, of the motion near rest on target under u = -feedback x."""
     from flint import acb_mat, ctx
 
     with ctx.workprec(BITS):

@@ -40,9 +40,9 @@ FEW, MANY = 16, 48
 
 
 def widest(carried: int, noted: int = 0) -> int:
-    """Return the fastest number of simultaneous lanes on this processor, for lanes that carry `carried` numbers and record
-    `noted`. It fills two of the widest registers per number if few are carried (with 32 registers, up to `MANY` and nothing
-    recorded); else one."""
+    """Return the number of simultaneous lanes that is fastest on this processor, for lanes that carry `carried` numbers and
+    record `noted` numbers. Each number fills two of the widest registers if few are carried (with 32 registers: at most
+    `MANY`, and none recorded), else one."""
     if _is_wide():
         return 8 if noted or carried > MANY else 16
     return 8 if carried + noted <= FEW else 4

@@ -63,7 +63,7 @@ SHAPES = (
 LIMITS = (0.01, 0.02, 0.045, 0.07, 0.12, 0.2, 0.4)
 """The shapes are near the largest sets for ab of up to these, and from 1 on, from a search among points of a grid."""
 SIGNED = (Shape(4.0, 0.0, 0.02, 0.0), Shape(4.0, 0.0, 0.1, 0.0), Shape(5.0, 0.0, 0.7, -0.7))
-"""Where the sign of the quaternion is chosen: with a cross term so small that a change of sign lowers V."""
+"""The shapes for laws that choose the sign of the quaternion: a change of sign lowers V, because the cross term is small."""
 
 
 def near(beta: float) -> tuple[Shape, ...]:

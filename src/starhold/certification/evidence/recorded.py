@@ -173,10 +173,9 @@ class RecordedLoop:
         named = [*labelled("gains", loop.gains), *labelled("craft", loop.known), ("measurement.period", float(loop.period))]
         numbers = {name: x.hex() for name, x in named if isfinite(x)}
         numbers |= {f"body.inertia.{i}.{k}": float(J[i][k]).hex() for i in range(3) for k in range(i, 3)}
-        if loop.wheels is not None:
-            for k, (axis, p) in enumerate(zip(loop.wheels.axes, loop.rotors, strict=True)):
-                numbers |= {f"wheel.{k}.axis.{i}": float(x).hex() for i, x in enumerate(axis)}
-                numbers[f"wheel.{k}.momentum"] = float(p).hex()
+        for k, (axis, p) in enumerate(zip(loop.wheel_axes, loop.rotors, strict=True)):
+            numbers |= {f"wheel.{k}.axis.{i}": float(x).hex() for i, x in enumerate(axis)}
+            numbers[f"wheel.{k}.momentum"] = float(p).hex()
         if (plan := self.plan) is not None:
             numbers |= {"plan.moves": str(plan.moves)}
             numbers |= {f"plan.state.{k}": float(x).hex() for k, x in enumerate(plan.state)}
@@ -278,9 +277,8 @@ class RecordedLoop:
     def too_little_momentum(self) -> bool:
         """Return whether a body at rest on a rotating target has more momentum than claimed."""
         loop, known = self.loop, self.known
-        stored = np.array(loop.rotors) @ np.array(loop.wheels.axes) if loop.wheels is not None else np.zeros(3)
         least = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[0]) * (1.0 - 1e-12)
-        return float(known.total_momentum) + float(np.linalg.norm(stored)) < least * float(known.target_rate)
+        return float(known.total_momentum) + float(np.linalg.norm(loop.stored)) < least * float(known.target_rate)
 
 
 def memory_torque(loop: RecordedLoop) -> Fraction:

@@ -52,7 +52,7 @@ CARD = Card(
     ),
     assumptions=(
         "balanced rotors, rigid frictionless bearings",
-        "the craft's inertia is that of the whole with every gimbal at angle zero and rotors that stand still in it",
+        "the craft's inertia is that of the whole spacecraft with every gimbal at angle zero and its rotors at rest",
         "steering knows the body's rate, angles and speeds without error, and acts all the time",
         "the gimbals' servo makes up for the moment that the turning body has on them, within the motors' limits",
         "no null motion: rotors are not brought back to their speeds, nor gimbals turned away from singularities",

@@ -167,7 +167,7 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """Return a small one at four readings per second, one that is exact but misaligned, and one with cones."""
+    """Return a small star tracker with four readings per second, an exact but misaligned one, and one with cones."""
     arcsec = math.radians(1.0 / 3600.0)
     sun, moon, lit, dark = (math.radians(angle) for angle in (40.0, 10.0, 30.0, 5.0))
     blinded = Params(1e-5, 1e-4, (0.0, 0.0, -1.0), 0.2, 0.0, NEVER, sun, moon, (lit, dark), math.radians(3.0))

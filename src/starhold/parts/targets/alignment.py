@@ -61,8 +61,8 @@ def aligned(first: Moving, second: Moving, axes: Matrix, before: Quaternion) -> 
 
 
 class Turning(NamedTuple):
-    """The largest rate (rad/s) and acceleration across it (rad/s2) of a direction, and how much of the rate and of the
-    acceleration is not known. sides: of both the parts along x and along y of `bounded`, where these are known."""
+    """Bounds on the turning of a direction: on its rate (rad/s), on its acceleration (rad/s2) across it, and on the unknown
+    part of each. sides: bounds on the components of rate and acceleration along x and y of `bounded`, where known."""
 
     rate: float
     acceleration: float

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from starhold.report.document import Section
     from starhold.scenario.reading import Scenario
-
+    from starhold.studies.body import Notice
 
 OUTCOMES = {
     **dict.fromkeys(("met", "proved", "settled", "kept", "agrees", "holds", "passed"), "green"),
@@ -205,7 +205,7 @@ class Command(NamedTuple):
         """Return the function that computes the study, with the proof if requested."""
         return self.prove if proof and self.prove is not None else self.study
 
-    def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None], proof: bool = False) -> Result:
+    def result(self, subject: tuple[Any, ...], notice: Notice, proof: bool = False) -> Result:
         """Return the presented result of a study of the arguments from `prepare`; proof: whether to use `prove`."""
         study = self.studying(proof)
         if self.doing is None:

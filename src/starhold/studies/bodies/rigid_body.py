@@ -83,8 +83,9 @@ class RigidBodyStudy(BodyStudy):
     ) -> Meter:
         masses = None
         if PREMISES in extras:
-            axes = () if loop.wheels is None else loop.wheels.axes
-            masses = Masses(loop.craft.inertia, axes, (0.0,) * len(MODES) if mode_laws(loop.law, loop.gains) else ())
+            masses = Masses(
+                loop.craft.inertia, loop.wheel_axes, (0.0,) * len(MODES) if mode_laws(loop.law, loop.gains) else ()
+            )
         for extra in extras:
             if extra not in (*EXTRAS, PREMISES):
                 raise ValueError(f"{' or '.join(EXTRAS)}, not {extra}")
@@ -152,16 +153,11 @@ def _differs(event: Event, issued: Issued, flown: ClosedLoop) -> bool:
     if event.step != issued.step or issued.step:
         return event.step > issued.step
     # A fault at the very start, known to the law or not.
-    loop, after = issued.loop, _after(event, flown)
+    loop, after = issued.loop, flown.after(event)
     after = after if issued.mode is None else loop_of_mode(after, issued.mode - 1)
     pairs = zip(after.parts, loop.parts, strict=True)
     same = same_numbers((event.craft, event.nominal, after.gains), (loop.craft, loop.craft, loop.gains))
     return not (same and all(same_numbers(one.params, other.params) for one, other in pairs))
-
-
-def _after(event: Event, loop: ClosedLoop) -> ClosedLoop:
-    """Return the loop that flies after an event."""
-    return replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
 
 
 def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing: bool = False) -> list[Issued]:
@@ -229,7 +225,7 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
         sound = all(tells(f.params) for f in event.parts if (tells := f.part.hook("gives_allocated_torque")) is not None)
         if not sound or event.nominal.inertia != event.craft.inertia:
             continue
-        now = _after(event, loop)
+        now = loop.after(event)
         if step:
             # One more step, for changes at the event itself.
             carry = fly(loop, step)[1]
