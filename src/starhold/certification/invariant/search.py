@@ -266,14 +266,14 @@ def rising(what: Candidate, level: float, sense: int = 1, digits: Sequence[int] 
     return None
 
 
-def reaching(what: Candidate, level: float) -> Found:
+def reaching(what: Candidate, level: float, digits: Sequence[int] = SIMPLE) -> Found:
     """Return the state on the border of the box with the least V found, verified to have V <= level; None without one."""
     best: tuple[Fraction, State] | None = None
     for k in range(len(what.system.variables)):
         for end in what.box[k]:
             face = [(end, end) if j == k else side for j, side in enumerate(what.box)]
             values = Values(what, grid(face, POINTS.get(len(face) - 1, 9)))
-            for state in rounded(values.points[:, int(np.nanargmin(values.V))]):
+            for state in rounded(values.points[:, int(np.nanargmin(values.V))], digits):
                 on_face = tuple(Fraction(end) if j == k else x for j, x in enumerate(state))
                 V = what.value(on_face) if what.has(on_face) else None
                 if V is not None and level >= V:
