@@ -121,7 +121,7 @@ class Follower(Reader):
     leaning: list[Poly]
     odd: list[Poly]
     rigid: dict[str, list[Poly]]
-    last_asked: tuple[Rows | None, Sizes, tuple[Sizes, list[Fraction], Fraction] | None] = None, {}, None
+    last_sizes: tuple[Rows | None, Sizes, tuple[Sizes, list[Fraction], Fraction] | None] = None, {}, None
     apart: Radii
     swayed: Radii
     leant: Radii
@@ -179,13 +179,13 @@ class Follower(Reader):
         """Return bounds of the torque's error where V + weight a^2 is at most c."""
         return {FIRST: root(up(c / self.late.weight)), REST: self.late.rest} if self.late else {}
 
-    def asked(self, region: Region) -> tuple[Sizes, list[Fraction], Fraction]:
+    def command_sizes(self, region: Region) -> tuple[Sizes, list[Fraction], Fraction]:
         """Return bounds of the acceleration that is commanded, of that at the sample, and of the torque due to external
         quantities, if what is told is true. They do not depend on errors, which are bounded again and again in a region."""
         sizes = {name: x for name, x in region.sizes.items() if name not in (FIRST, REST, *AMISS)}
         near = sizes | {"v": 1 - region.least}
-        X, of, found = self.last_asked
-        if found is None or X is not region.X or of != near:
+        X, of, known = self.last_sizes
+        if known is None or X is not region.X or of != near:
             # In an ellipsoid c.x is at most the root of c.Xc.
             even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
             even = [min(x, sizes.get(PULL, x)) for x in even]
@@ -193,9 +193,9 @@ class Follower(Reader):
             asks = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
             pulled = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
             rigid = sum((felt(parts, x, sizes) * self.size(x) for x, parts in self.rigid.items()), ZERO)
-            found = asks, pulled, rigid
-            self.last_asked = region.X, near, found
-        return found
+            known = asks, pulled, rigid
+            self.last_sizes = region.X, near, known
+        return known
 
     def behind(self, sizes: Sizes, rest: bool = False) -> Behind:
         """Return bounds of the late torque's error, or of its part b alone."""

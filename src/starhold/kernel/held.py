@@ -218,7 +218,7 @@ class Held(Follower):
         """Return a set that motions from a region do not leave for a period. amiss: additional errors of measured attitude
         and rate due to the motion, by default slightly more than after a motion that did not leave the tube."""
         sizes = region.sizes
-        asks, pulled, rigid = self.asked(region)
+        asks, pulled, rigid = self.command_sizes(region)
         rigid, late = rigid + self.lasting, self.behind(sizes)
 
         def within(bounds: list[Fraction]) -> Sizes:

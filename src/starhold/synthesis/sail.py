@@ -169,11 +169,11 @@ def cone_for(lean: float, specular: float, diffuse: float) -> float:
     return rising(lambda cone: lean_of(cone, specular, diffuse) - lean, 0.0, widest)
 
 
-def outline(specular: float, diffuse: float) -> NDArray[np.float64]:
-    """Return the outline (181, 2) of the forces with the full area, along X and across it, in units of pressure times
+def outline(specular: float, diffuse: float, count: int = 181) -> NDArray[np.float64]:
+    """Return the outline (count, 2) of the forces with the full area, along X and across it, in units of pressure times
     area, from zero to the largest angle. The set of all forces is the region between it and the origin, rotated about X; it
     is convex."""
-    cone = np.linspace(0.0, math.acos(widest_cosine(specular, diffuse)), 181)
+    cone = np.linspace(0.0, math.acos(widest_cosine(specular, diffuse)), count)
     c, along = np.cos(cone), 2.0 * specular * np.cos(cone) + LAMBERT * diffuse
     return np.stack([c * (1.0 - specular + along * c), c * along * np.sin(cone)], axis=1)
 

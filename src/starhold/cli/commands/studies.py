@@ -1,19 +1,16 @@
 """Makes a command of each file in `starhold.report.commands`."""
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from starhold.cli.arguments import REFUTED, UNDECIDED, Drawn, Force, Pictures, Proof, Rocq, Unstable, results_in
 from starhold.errors import InputError
 from starhold.report.commands import Command, command, names
-
-if TYPE_CHECKING:
-    from starhold.studies.body import Notice
 
 CODES = {"missed": REFUTED, "undecided": UNDECIDED}
 
@@ -118,7 +115,7 @@ def _parameters(declared: Command) -> dict[str, Any]:
 
 
 @contextmanager
-def _progress(declared: Command) -> "Iterator[Notice]":
+def _progress(declared: Command) -> Iterator[Callable[[int, int, str], None]]:
     """Show a progress bar; yield the function by which a command reports its progress."""
     if declared.doing is None:
         yield lambda done, total, what: None
