@@ -110,8 +110,9 @@ class Claim:
 
 WITHOUT, ORBIT, UNTIL, LATE, FRESH, EVEN = "without:", "orbit-within:", "until:", "late:", "fresh:", "even:"
 """The prefixes of the identifiers of assumptions: that a part, role and name, is absent; that forces move the orbit by at
-most a share; that a flight has not lasted longer (s); that the torque is at first no further from the command (N m); and
-that directions gave an attitude no longer ago (s)."""
+most a share; that a flight has not lasted longer (s); that the torque is at first no further from the command (N m);
+that directions gave an attitude no longer ago (s); and that an estimate is off by no more (rad) because the body turns
+otherwise than at the mean of two readings of its gyro."""
 STEADY = "steady-target"
 """The assumption that the target does not jump."""
 BESIDE = ("sampling", "control-limit", "saturated-axis", "detumbling")

@@ -55,11 +55,11 @@ def longest(numbers: Iterable[Fraction]) -> int:
 
 def rational(given: Any) -> Fraction:
     """Read an exact number: -2, 3/4, or the hexadecimal form of a float, which is its exact value."""
-    return written(given if isinstance(given, str) else "")
+    return _parsed(given if isinstance(given, str) else "")
 
 
 @lru_cache(1024)
-def written(text: str) -> Fraction:
+def _parsed(text: str) -> Fraction:
     """Read the text of a number; those of a symmetric matrix stand twice."""
     if match := _FLOAT.fullmatch(text):
         sign, whole, after, exponent = match.groups(default="")

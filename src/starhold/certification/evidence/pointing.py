@@ -119,7 +119,7 @@ class Pushed:
         demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
         self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
-        self.too_near = set[tuple[Any, ...]]()
+        self.slow = dict[tuple[Any, ...], list[Chain]]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= numbers_of(loop.known.late)
@@ -179,7 +179,7 @@ class Pushed:
             return self.kept(self.may_begin, angle, rate, limits)
 
         def far_enough(angle: float) -> bool:
-            return starting(angle) or (angle, rate, *limits.items()) in self.too_near
+            return starting(angle) or self.too_near((angle, rate, *limits.items()))
 
         # A start within a smaller set is also within the larger one. Where none begins, sets may be too small for their V.
         first = bisect_left(angles, True, key=starting)
@@ -187,7 +187,7 @@ class Pushed:
             first = bisect_left(angles, True, key=far_enough)
         faster = [one for one in beyond if one > rate > 0.0]
         for angle in angles[first:]:
-            if (angle, rate, *limits.items()) in self.too_near:
+            if self.too_near((angle, rate, *limits.items())):
                 break
             place = bisect_left(faster, True, key=lambda one: self.kept(self.may_begin, angle, one, limits))
             yield angle, (*faster[place : place + 1], rate)
@@ -230,9 +230,14 @@ class Pushed:
                 slow.append(first)
             elif begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
                 return together or [first]
-        if len(slow) == len(shapes) and any(one.wants_more() for one in slow):
-            self.too_near.add((angle, rate, *limits.items()))
+        if len(slow) == len(shapes):
+            self.slow[angle, rate, *limits.items()] = slow
         return []
+
+    def too_near(self, start: tuple[Any, ...]) -> bool:
+        """Return whether larger sets may do than those of a start on which V decreases too little; asked only where no start
+        does, because it takes another level of each."""
+        return any(one.wants_more() for one in self.slow.get(start, ()))
 
     def within(self, angle: float, rate: float, limits: dict[str, float]) -> list[Shape]:
         """Return shapes of V to try within limits: of those whose set demands little torque, and of the usual ones."""
