@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, PrivateAttr, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from starhold.errors import InputError
 from starhold.scenario.checking import nearest, show, validate
@@ -338,7 +338,13 @@ def _read(given: Any) -> Distribution:
         raise told_at(error.key, error.given, error.allowed) from None
 
 
-Dispersed: TypeAlias = Annotated[
-    Any, BeforeValidator(_read), WithJsonSchema({"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]})
-]
+class _AnyDistribution:
+    """The JSON Schema of a dispersion, made only when it is asked for."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(schema: object, handler: object) -> dict[str, Any]:
+        return {"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]}
+
+
+Dispersed: TypeAlias = Annotated[Any, BeforeValidator(_read), _AnyDistribution]
 """The table of one dispersion, validated by the class that its `distribution` names."""
