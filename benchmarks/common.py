@@ -28,6 +28,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit
 from starhold.parts.craft import EARTH, Craft, make_craft
+from starhold.trace.machine import is_wide
 
 PERIOD = 0.1
 ORBIT = (fit("environment", "two-body"), fit("environment", "gravity-gradient"))
@@ -64,6 +65,13 @@ def _version(name: str) -> str:
         import starhold
 
         return starhold.__version__ if name == "starhold" else "not installed"
+
+
+def verdict(met: bool, goal: float, wide: bool = False) -> str:
+    """What to say of a goal. One that was set with registers of 512 bits (`wide`) is not missed without them."""
+    if met:
+        return f"meets {goal:g}"
+    return f"MISSES {goal:g}" if is_wide() or not wide else f"not {goal:g}, set with AVX-512"
 
 
 class Spent(NamedTuple):

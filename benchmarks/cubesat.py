@@ -22,7 +22,7 @@ import peak
 import steps
 from basilisk_cubesat import in_basilisk
 from basilisk_software import POINTING, as_in_basilisk, under, without
-from common import gap, header, interleaved, show
+from common import gap, header, interleaved, show, verdict
 from starhold.laws.pd import Gains
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.building import build
@@ -68,8 +68,8 @@ def main() -> None:
         many = times[f"{name} many"] / (TOGETHER * LANES)
         rows += [
             [f"{name}: Basilisk", f"{theirs * 1e9:.0f}", "1", ""],
-            [f"{name}: starhold, one lane", f"{alone * 1e9:.0f}", *verdict(theirs / alone, GOALS[name][0])],
-            [f"{name}: starhold, {LANES} lanes, one core", f"{many * 1e9:.0f}", *verdict(theirs / many, GOALS[name][1])],
+            [f"{name}: starhold, one lane", f"{alone * 1e9:.0f}", *judged(theirs / alone, GOALS[name][0])],
+            [f"{name}: starhold, {LANES} lanes, one core", f"{many * 1e9:.0f}", *judged(theirs / many, GOALS[name][1])],
         ]
     show(["cubesat-nadir", "ns per step", "times as fast", "goal"], rows)
     show(["a step of starhold", "operations", "of all"], list(operations(everything)))
@@ -95,9 +95,9 @@ def check(loop: ClosedLoop) -> None:
         raise SystemExit("starhold and Basilisk fly different motions: there is nothing to compare")
 
 
-def verdict(ratio: float, goal: int) -> list[str]:
+def judged(ratio: float, goal: int) -> list[str]:
     """The ratio, and whether it is what it is meant to be."""
-    return [f"{ratio:.0f}", f"{'meets' if ratio >= goal else 'MISSES'} {goal}"]
+    return [f"{ratio:.0f}", verdict(ratio >= goal, goal, wide=True)]
 
 
 def operations(loop: ClosedLoop) -> list[list[str]]:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from common import header, interleaved, show
+from common import header, interleaved, show, verdict
 from starhold.analysis.roots import Found, search
 from starhold.analysis.transient import Limits
 from starhold.scenario.reading import load
@@ -149,7 +149,7 @@ def main() -> None:
     spent = [each.work / count for each, count in zip(times.values(), counts, strict=True)]
     print(f"A transient costs SciPy {spent[2] / spent[1]:.0f} times as much as a lane of one thread.")
     whole = times["all angles, all threads"].wall
-    print(f"The whole search: {whole:.1f} s, {'meets' if whole <= GOAL else 'MISSES'} {GOAL:g} s.")
+    print(f"The whole search: {whole:.1f} s, {verdict(whole <= GOAL, GOAL)} s.")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import starhold as sh
-from common import STEADY_LOOP, STEADY_TORQUE, header, in_basilisk, interleaved, show
+from common import STEADY_LOOP, STEADY_TORQUE, header, in_basilisk, interleaved, show, verdict
 from starhold.link.protocol import Decoder, Kind, Message, binary, line
 from starhold.simulation.stepper import Stepper
 
@@ -121,7 +121,7 @@ def main() -> None:
     show(["a step asked for from Python", "us", "x Basilisk"], rows)
     over_a_network()
     least = micro["starhold, a command"]
-    print(f"{'meets' if least <= GOAL else 'MISSES'} the goal of {GOAL:g} us a step: {least:.2f}")
+    print(f"Microseconds a step: {least:.2f}, {verdict(least <= GOAL, GOAL)}")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import common
-from common import EARTH, FEEDBACK_GAINS, INERTIA, PERIOD, Spent, header, interleaved, show
+from common import EARTH, FEEDBACK_GAINS, INERTIA, PERIOD, Spent, header, interleaved, show, verdict
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
 from starhold.laws.catalogue import catalogue
@@ -151,8 +151,8 @@ def engines() -> None:
     show(["engine, problem", "ns per step", "of one lane", "end state: rad, rad/s apart"], rows)
     for name in loops if basilisk else []:
         alone, core = (cost[f"{name} basilisk"] / cost[f"{name} {way}"] for way in ("alone", "core"))
-        print(f"Basilisk / starhold, {name}: one lane {alone:.0f} ({_verdict(alone, GOAL_ALONE)}), ", end="")
-        print(f"many lanes per core {core:.0f} ({_verdict(core, GOAL_MANY)})")
+        print(f"Basilisk / starhold, {name}: one lane {alone:.0f} ({verdict(alone >= GOAL_ALONE, GOAL_ALONE)}), ", end="")
+        print(f"many lanes per core {core:.0f} ({verdict(core >= GOAL_MANY, GOAL_MANY)})")
     setting_up = times["feedback core, none"].work / LANES
     worth = setting_up / cost["feedback core"]
     print(f"Setting up a batch: {setting_up * 1e6:.1f} us a lane, once: {worth:.0f} steps\n")
@@ -169,10 +169,6 @@ def _gap(one: State, other: State) -> str:
 
 def _basilisk_end(name: str) -> State:
     return common.in_basilisk(name)(CHECKED)
-
-
-def _verdict(ratio: float, goal: int) -> str:
-    return f"{'meets' if ratio >= goal else 'MISSES'} {goal}"
 
 
 def variants(loop: ClosedLoop) -> dict[str, ClosedLoop]:

@@ -9,7 +9,7 @@ import numpy as np
 
 import common
 import steps
-from common import header, interleaved, show
+from common import header, interleaved, show, verdict
 from starhold.laws.catalogue import catalogue
 from starhold.parts.catalogue import find
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
@@ -54,7 +54,7 @@ def main() -> None:
         rows.append([name, f"{cost * 1e9:.1f}", f"{cost / without:.2f}"])
     show(["wheel law, many lanes, one core", "ns per lane-step", "of no wheels"], rows)
     four = steps.per_core(times, "4 wheels") / without
-    print(f"Four wheels: {four:.2f}, {'meets' if four <= GOAL else 'MISSES'} {GOAL}")
+    print(f"Four wheels: {four:.2f}, {verdict(four <= GOAL, GOAL, wide=True)}")
 
 
 if __name__ == "__main__":

@@ -43,12 +43,12 @@ def widest(carried: int, noted: int = 0) -> int:
     """Return the number of simultaneous lanes that is fastest on this processor, for lanes that carry `carried` numbers and
     record `noted` numbers. Each number fills two of the widest registers if few are carried (with 32 registers: at most
     `MANY`, and none recorded), else one."""
-    if _is_wide():
+    if is_wide():
         return 8 if noted or carried > MANY else 16
     return 8 if carried + noted <= FEW else 4
 
 
-def _is_wide() -> bool:
+def is_wide() -> bool:
     """Return whether this processor has 32 registers of 512 bits."""
     return bool(_llvm().get_host_cpu_features().get("avx512f"))
 
@@ -63,7 +63,7 @@ def load(program: Program, width: int, passes: bool | None = None) -> Callable[.
     steps on."""
     calls = any(isinstance(s, Call) and s.rows == 1 for s in statements(program.main.body))
     if passes is None:
-        passes = width > 1 and _is_wide() and not calls
+        passes = width > 1 and is_wide() and not calls
     llvm, machine = _llvm(), _machine()
     # With many lanes, or a law that solves an optimization, the time is spent elsewhere.
     module = llvm.parse_assembly(str(Llvm(program if width > 1 or calls else ordered(program), width)))
