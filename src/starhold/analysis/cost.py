@@ -15,6 +15,8 @@ CALLS = 50_000
 """Most calls timed, as many as for the published table."""
 CHUNK = 1e-4
 """Intended duration of a timed chunk (s), long compared with its overhead; a slow law is timed with fewer calls."""
+LONGEST = 1.0
+"""The time (s) after which no further chunk is timed."""
 
 
 class Replay:
@@ -55,7 +57,7 @@ def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float6
     return np.hstack(columns)
 
 
-def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS, seconds: float = 1.0) -> dict[str, float]:
+def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS) -> dict[str, float]:
     """Return median and worst processor time (s) of a call, over chunks of calls that replay the states of a flight in
     order.
 
@@ -74,7 +76,7 @@ def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS
     chunk = max(1, min(len(states), int(CHUNK / single)))
     costs: list[float] = []
     begun, first = time.thread_time(), 0
-    while len(costs) * chunk < calls and time.thread_time() - begun < seconds:
+    while len(costs) * chunk < calls and time.thread_time() - begun < LONGEST:
         first = first if first + chunk <= len(states) else 0
         costs.append(max(timed(first, first + chunk) - overhead, 0.0) / chunk)
         first += chunk

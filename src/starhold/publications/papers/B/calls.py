@@ -76,9 +76,9 @@ def mean_time(desk: Desk, name: str) -> float:
     return float(call_times(desk)[name][: WINDOW // TIMED[name].chunk].mean())
 
 
-def ratio(desk: Desk, name: str, to: str = "lyapunov") -> float:
-    """The mean duration of a call divided by that of another law."""
-    return mean_time(desk, name) / mean_time(desk, to)
+def ratio(desk: Desk, name: str) -> float:
+    """The mean duration of a call divided by that of the Lyapunov law."""
+    return mean_time(desk, name) / mean_time(desk, "lyapunov")
 
 
 def total_time(desk: Desk, name: str) -> Finding:
