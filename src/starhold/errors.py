@@ -1,7 +1,7 @@
 """Errors that a user can cause: one line of text, and exit code 2 of the command line."""
 
 import signal
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from importlib import import_module
@@ -71,6 +71,15 @@ def shortly(function: _Function) -> _Function:
             raise error.with_traceback(None) from None
 
     return cast(_Function, called)
+
+
+def closest(word: str, known: Sequence[str]) -> str:
+    """Return a hint for an unknown word: the nearest known one, else all of them."""
+    # Imported here, because most commands do without.
+    from difflib import get_close_matches
+
+    near = get_close_matches(word[:100], known, n=1, cutoff=0.6)
+    return f"did you mean {near[0]}?" if near else f"one of {', '.join(known)}"
 
 
 def optional(name: str, user: str, bundle: str) -> Any:
