@@ -1,7 +1,7 @@
-"""Errors that a user can cause are one line; the command line ends with exit code 2 on it."""
+"""Errors that a user can cause: one line of text, and exit code 2 of the command line."""
 
 import signal
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from importlib import import_module
@@ -15,8 +15,8 @@ class InterruptedByUserError(BaseException):
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Whether an error is the user's request to stop, and no fault of the file in which it was raised. Commands handle
-    Ctrl-C themselves, so that a `KeyboardInterrupt` there comes from the file."""
+    """Whether an error is the user's request to stop, rather than an error of the user's file that was running. Commands
+    handle Ctrl-C themselves, so a `KeyboardInterrupt` in them was raised by the file."""
     plain = isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) is signal.default_int_handler
     return plain or isinstance(error, InterruptedByUserError)
 
@@ -38,7 +38,8 @@ class InputError(Exception):
 
 
 class CutShortError(InputError):
-    """A flight ended early by what is outside of it; recording: what was flown until then, where anything was."""
+    """A flight ended early for a reason outside the simulation, such as a law's process that failed; recording: the flight
+    until then, None if there is nothing of it."""
 
     recording: Any = None
 
@@ -52,7 +53,7 @@ def expect(value: Any, kinds: Any, where: str, allowed: str) -> None:
 
 @contextmanager
 def input_at(where: str, key: str, given: str = "") -> Generator[None]:
-    """Refuse as the user's input there what raises a ValueError."""
+    """Inside this context, turn a ValueError into an InputError about this key."""
     try:
         yield
     except ValueError as error:
@@ -60,7 +61,7 @@ def input_at(where: str, key: str, given: str = "") -> Generator[None]:
 
 
 def shortly(function: _Function) -> _Function:
-    """Let a function of the Python interface raise its InputError without the frames below, which add nothing."""
+    """Decorate a function of the Python interface: the traceback of its InputError ends at the caller."""
 
     @wraps(function)
     def called(*args: Any, **keywords: Any) -> Any:
@@ -72,13 +73,22 @@ def shortly(function: _Function) -> _Function:
     return cast(_Function, called)
 
 
+def closest(word: str, known: Sequence[str]) -> str:
+    """Return a hint for an unknown word: the nearest known one, else all of them."""
+    # Imported here, because most commands do without.
+    from difflib import get_close_matches
+
+    near = get_close_matches(word[:100], known, n=1, cutoff=0.6)
+    return f"did you mean {near[0]}?" if near else f"one of {', '.join(known)}"
+
+
 def optional(name: str, user: str, bundle: str) -> Any:
-    """The module of this name; InputError, with the extra that installs it, where its package is missing. user: what needs
-    it."""
+    """Return the module of this name. InputError, which names the extra to install, if its package is missing. user: what
+    needs the package, such as a command; bundle: the extra."""
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
-        # A module missing from inside a package that is installed is another matter.
+        # A module missing inside an installed package is an error of that package.
         if error.name is None or error.name.partition(".")[0] != name.partition(".")[0]:
             raise
         package = name.partition(".")[0]

@@ -1,4 +1,4 @@
-"""Files appear under their names only when they are whole, and only one process at a time writes into a folder."""
+"""Atomic writes: a file appears under its name only when it is complete; and locks: one process writes into a folder."""
 
 import atexit
 import errno
@@ -54,7 +54,7 @@ def clear_unfinished(folder: Path) -> None:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a whole file. OSError where it cannot be read or is larger than LARGEST, for a device has no end."""
+    """Read a whole file. OSError where it cannot be read or is larger than LARGEST; a device could be read without end."""
     with path.open("rb") as file:
         content = file.read(LARGEST + 1)
     if len(content) > LARGEST:
@@ -84,14 +84,13 @@ def atomic_write(path: Path) -> Generator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text in UTF-8, with the same line ends on every system; whole, as `atomic_write`."""
+    """Write a text in UTF-8 by `atomic_write`, with the same line ends on every system."""
     with atomic_write(path) as hidden:
         hidden.write_text(text, encoding="utf-8", newline="\n")
 
 
 def filled(package: str, template: str, values: Mapping[str, Any]) -> str:
     """Return the text of a template of a package with values in place of each @KEY@."""
-
     text = (resources.files(package) / "templates" / f"{template}.txt").read_text(encoding="utf-8")
     return re.sub(r"@(\w+)@", lambda match: str(values.get(match[1], match[0])), text)
 

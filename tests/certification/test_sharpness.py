@@ -6,11 +6,11 @@ import control
 import numpy as np
 import pytest
 from scipy import linalg
-from scipy.integrate import solve_ivp
 
 from generators import proved, sharpness
 from starhold.certification.evidence.chains import ALIKE
 from starhold.studies.budget import TOGETHER
+from tests.making import spun
 from tests.tiers import drawn
 
 NAMES = [" ".join(pair) for pair in sharpness.LOOPS]
@@ -70,17 +70,11 @@ def test_an_extremal_torque_takes_the_nonlinear_loop_as_far(entries):
     while np.abs(rows[-1] @ B[:, k]) > 1e-7 or len(rows) < 99:
         rows.append(rows[-1] @ A)
     turns = np.sign([row @ B[:, k] for row in reversed(rows)])
-    inverse, x = np.linalg.inv(loop.J), np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    q, w = np.eye(4)[0], np.zeros(3)
     for sign in turns:
-        torque = -loop.C @ x[:3] - loop.K @ x[4:] + sign * stored["torque"] * np.eye(3)[k]
-
-        def slope(t, y, torque=torque):
-            w, q = y[:3], y[3:]
-            spin = inverse @ (torque - np.cross(w, loop.J @ w))
-            return [*spin, -0.5 * q[1:] @ w, *(0.5 * (q[0] * w + np.cross(q[1:], w)))]
-
-        x = solve_ivp(slope, (0.0, loop.h), x, rtol=1e-9, atol=1e-13).y[:, -1]
-    far = 2.0 * np.arcsin(np.linalg.norm(x[4:]))
+        torque = -loop.C @ w - loop.K @ q[1:] + sign * stored["torque"] * np.eye(3)[k]
+        q, w = (found[-1] for found in spun(lambda t, q, held=torque: held, (0.0, loop.h), q, w, loop.J))
+    far = 2.0 * np.arcsin(np.linalg.norm(q[1:]))
     assert far == pytest.approx(2.0 * stored["torque"] * sharpness.summed(loop, False), rel=1e-2)
     assert 0.95 * stored["angle"] < far <= stored["angle"]
 

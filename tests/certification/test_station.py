@@ -21,7 +21,7 @@ PEAK = l2_circle.peak_demand(PLANT, BEST.rate)
 STEEP = 1.0 + 2.0 * PLANT.stiffness
 BESIDE = l2_equilibrium.design(PLANT, l2_equilibrium.Degree(y=1.0))
 RELAY = SOFT._replace(boundary_layer=0.0)
-CIRCLE, LIMIT = (("certificates", 0, "claims", place) for place in (0, 1))
+LIMIT = ("certificates", 0, "claims", 1)
 
 
 def claims_of(*given, **changes):

@@ -131,6 +131,13 @@ def rekeyed(content):
     return content
 
 
+def with_program(content, role, program):
+    """A certificate of one claim with another program in this role."""
+    (claim,) = content["claims"]
+    content["programs"][claim["programs"][role]] = program
+    return rekeyed(content)
+
+
 def text(content):
     """A certificate as a file holds it."""
     return json.dumps(content)

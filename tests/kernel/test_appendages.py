@@ -18,11 +18,11 @@ from starhold.certification.subject import make_subject
 from starhold.kernel import appended
 from starhold.kernel.check import check
 from starhold.kernel.numbers import WORK, Account, RefusedError, rational
-from starhold.kernel.programs import Program, digest
+from starhold.kernel.programs import Program
 from starhold.kernel.taylor import BITS, ONE, run, within
 from starhold.kernel.theorems.response import Response
 from starhold.simulation.lane import fly, label
-from tests.kernel.certificates import failing
+from tests.kernel.certificates import failing, with_program
 from tests.kernel.flights import turned_on
 from tests.kernel.oracle import number
 from tests.kernel.programs import run as run_in_floats
@@ -186,10 +186,7 @@ def test_a_motion_that_does_not_rest_is_pushed():
     count = len(program["inputs"]) + len(program["steps"])
     program["steps"] += [["constant", "1/20"], ["plus", program["outputs"][0], count]]
     program["outputs"][0] = count + 1
-    content["programs"][digest(program)] = program
-    content["programs"].pop(claim["programs"]["motion"])
-    claim["programs"]["motion"] = digest(program)
-    assert not accepted(content)
+    assert not accepted(with_program(content, "motion", program))
     assert max(shares(content, 5.0).values()) > 1.0
 
 

@@ -7,8 +7,7 @@ from fractions import Fraction
 import pytest
 
 from starhold.kernel.numbers import rational
-from starhold.kernel.programs import digest
-from tests.kernel.certificates import failing
+from tests.kernel.certificates import failing, with_program
 from tests.kernel.mutations import refusals
 from tests.kernel.swaying import Swaying, content_of
 from tests.tiers import fewer
@@ -80,18 +79,16 @@ def reversed_torque(content, claim):
 
     steps = [step if step[0] == "constant" else [step[0], *map(moved, step[1:])] for step in program["steps"]]
     program = program | {"steps": guard + steps, "outputs": list(map(moved, program["outputs"]))}
-    content["programs"][digest(program)] = program
-    claim["programs"]["motion"] = digest(program)
+    with_program(content, "motion", program)
 
 
 def backwards(content, claim):
     """The body turns against its rate."""
-    program = copy.deepcopy(content["programs"].pop(claim["programs"]["turning"]))
+    program = copy.deepcopy(content["programs"][claim["programs"]["turning"]])
     count = len(program["inputs"]) + len(program["steps"])
     program["steps"] += [["constant", "-1"], *(["product", count, k] for k in program["outputs"])]
     program["outputs"] = [count + 1 + k for k in range(4)]
-    content["programs"][digest(program)] = program
-    claim["programs"]["turning"] = digest(program)
+    with_program(content, "turning", program)
 
 
 FALSE = {

@@ -333,10 +333,10 @@ def test_bounds_of_samples_are_those_of_every_one_of_them():
                 assert np.allclose(np.array(one, dtype=float), samples[-1], rtol=1e-12)
 
 
-def response(chain, none=False):
+def response(chain):
     """That of one sample, of the rows of the rate, the turn and the linear acceleration."""
     motion = chain.motion
-    rows = np.vstack([np.eye(N)[:6], np.array(motion.pull, dtype=float)]) * (not none)
+    rows = np.vstack([np.eye(N)[:6], np.array(motion.pull, dtype=float)])
     first, last, middle, held = (rows @ np.array(way, dtype=float) for way in motion.ways)
     parts = [slice(3 * k, 3 * k + 3) for k in range(3)]
     gains = [

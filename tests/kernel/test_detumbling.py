@@ -21,7 +21,6 @@ from starhold.certification.subject import make_subject
 from starhold.kernel.check import check
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import RefusedError, rational
-from starhold.kernel.programs import digest
 from starhold.kernel.theorems import detumbling
 from starhold.laws import b_dot
 from starhold.loop.modes import loop_of_mode
@@ -29,7 +28,7 @@ from starhold.parts.contract import NoParams, Push
 from starhold.parts.part import Fitted, Part
 from starhold.scenario.building import build
 from starhold.trace.straight_line import straight_line
-from tests.kernel.certificates import failing, rekeyed, text
+from tests.kernel.certificates import failing, rekeyed, text, with_program
 from tests.kernel.mutations import refusals
 from tests.kernel.tumbling import Tumbling
 from tests.making import built
@@ -167,15 +166,10 @@ def drifting(measurement, gains, craft, memory):
 
 def with_law(law):
     """The certificate about another law."""
-    content = copy.deepcopy(tumbling())
-    (claim,) = content["claims"]
     gains, craft = b_dot.examples()[0], None
     memory = b_dot.remember(gains, craft, 1.0)
     program = straight_line(law, measurement=ASKED, gains=gains, craft=craft, memory=memory)
-    del content["programs"][claim["programs"]["law"]]
-    content["programs"][digest(program)] = program
-    claim["programs"]["law"] = digest(program)
-    return content
+    return with_program(copy.deepcopy(tumbling()), "law", program)
 
 
 @pytest.mark.parametrize("law", [along, stale, idle, undivided, switching, halved, drifting])

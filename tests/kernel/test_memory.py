@@ -19,11 +19,10 @@ from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes
 from starhold.kernel.check import check
 from starhold.kernel.numbers import RefusedError, rational
-from starhold.kernel.programs import digest
 from starhold.laws import pid
 from starhold.parts.craft import make_craft
 from starhold.trace.straight_line import straight_line
-from tests.kernel.certificates import failing, text
+from tests.kernel.certificates import failing, text, with_program
 from tests.kernel.mutations import refusals
 from tests.kernel.oracle import is_kept
 from tests.laws.motion import fly
@@ -79,14 +78,9 @@ def test_flights_end_as_near_as_is_claimed(law, least):
 
 def other(law):
     """The certificate with another law."""
-    content = copy.deepcopy(pointing())
-    (claim,) = content["claims"]
     memory = pid.remember(GAINS, None, PERIOD)
     program = straight_line(law, measurement=ASKED, gains=GAINS, craft=make_craft(MOMENTS), memory=memory)
-    del content["programs"][claim["programs"]["law"]]
-    content["programs"][digest(program)] = program
-    claim["programs"]["law"] = digest(program)
-    return content
+    return with_program(copy.deepcopy(pointing()), "law", program)
 
 
 def plain(measurement, gains, added):

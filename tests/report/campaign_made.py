@@ -172,8 +172,7 @@ def indices() -> dict[str, Any]:
             np.array([12.0, 5.0, 0.4]),
             40,
             3,
-            0.95,
         ),
-        "final_attitude_error": Sobol(names, np.array([0.1, 0.7, 0.02]), wide, np.array([0.15, 0.85, 0.03]), wide, 0.95),
+        "final_attitude_error": Sobol(names, np.array([0.1, 0.7, 0.02]), wide, np.array([0.15, 0.85, 0.03]), wide),
         "effort": Refused("3 runs have no value, and Sobol's estimators need all 640"),
     }

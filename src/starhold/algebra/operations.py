@@ -95,7 +95,7 @@ def whole(symbolic: _Form, *slopes: _Form) -> Callable[[_Function], _Function]:
 
 
 def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
-    """Apply the operation in the meaning that it has for the reader of the values."""
+    """Apply the operation as the interpreter of these values defines it, such as a recorder or dual numbers."""
     readers = [_reader(value) for value in values]
     for value, reader in zip(values, readers, strict=True):
         if reader == "record":

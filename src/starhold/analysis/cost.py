@@ -15,6 +15,8 @@ CALLS = 50_000
 """Most calls timed, as many as for the published table."""
 CHUNK = 1e-4
 """Intended duration of a timed chunk (s), long compared with its overhead; a slow law is timed with fewer calls."""
+LONGEST = 1.0
+"""The time (s) after which no further chunk is timed."""
 
 
 class Replay:
@@ -31,6 +33,12 @@ class Replay:
     def __call__(self, first: int, last: int) -> None:
         """Call the law on states first .. last-1."""
         self._kernel(self._memories, first, last - first, self._seed, 0)
+
+    def timed(self, first: int, last: int) -> float:
+        """Return the processor time (s) of these calls."""
+        begun = time.thread_time()
+        self(first, last)
+        return time.thread_time() - begun
 
 
 def compile_calls(loop: ClosedLoop) -> tuple[Kernel, ClosedLoop]:
@@ -55,28 +63,22 @@ def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float6
     return np.hstack(columns)
 
 
-def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS, seconds: float = 1.0) -> dict[str, float]:
+def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS) -> dict[str, float]:
     """Return median and worst processor time (s) of a call, over chunks of calls that replay the states of a flight in
     order.
 
     The figures are latencies, see `Replay`."""
     repeat = Replay(loop, states)
     few = min(1000, len(states))
-
-    def timed(first: int, last: int) -> float:
-        begun = time.thread_time()
-        repeat(first, last)
-        return time.thread_time() - begun
-
-    timed(0, 1)
-    overhead = _median([timed(0, 0) for _ in range(50)])
-    single = max(min(timed(0, few) for _ in range(3)) - overhead, 1e-9) / few
+    repeat.timed(0, 1)
+    overhead = _median([repeat.timed(0, 0) for _ in range(50)])
+    single = max(min(repeat.timed(0, few) for _ in range(3)) - overhead, 1e-9) / few
     chunk = max(1, min(len(states), int(CHUNK / single)))
     costs: list[float] = []
     begun, first = time.thread_time(), 0
-    while len(costs) * chunk < calls and time.thread_time() - begun < seconds:
+    while len(costs) * chunk < calls and time.thread_time() - begun < LONGEST:
         first = first if first + chunk <= len(states) else 0
-        costs.append(max(timed(first, first + chunk) - overhead, 0.0) / chunk)
+        costs.append(max(repeat.timed(first, first + chunk) - overhead, 0.0) / chunk)
         first += chunk
     return {"cost_median": _median(costs), "cost_worst": max(costs)}
 

@@ -48,7 +48,7 @@ def begun(masses: Masses | None) -> Any:
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
-    """Return the notes after an instant. Quantities that no part reports are given to the law exactly."""
+    """Return the notes updated with the quantities of a sample. The law knows exactly what no part reports to it."""
     if not seen:
         return seen
     attitude, rate = (quantities[name] for name in ("attitude", "rate"))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from starhold.campaign.dispersions import Dispersion
 from starhold.campaign.extras import extra
-from starhold.campaign.sensitivity import saltelli_design
+from starhold.campaign.sensitivity import points_of, saltelli_design
 from starhold.errors import InputError
 from starhold.scenario.checking import nearest, show
 from starhold.scenario.distribution import Array
@@ -171,11 +171,7 @@ def _generator(seed: int) -> np.random.Generator:
 
 
 def _sobol(dims: int, seed: int, first: int, count: int) -> Array:
-    from scipy.stats import qmc
-
-    # Untyped, because newer versions have `seed` only at run time, and older ones only that.
-    make: Any = qmc.Sobol
-    sequence = make(dims, scramble=True, seed=_generator(seed))
+    sequence = points_of("Sobol", dims, _generator(seed))
     # The first point is drawn alone: the library warns unless the first draw is a power of 2, but the caller chooses where
     # to split.
     head = sequence.random(1)
@@ -189,10 +185,7 @@ def _sobol(dims: int, seed: int, first: int, count: int) -> Array:
 @lru_cache(maxsize=1)
 def _latin_hypercube(keys: tuple[tuple[int, int], ...], runs: int) -> Array:
     """Return the whole sample (runs, dims); keys: for each dispersion its key and its number of uniforms."""
-    from scipy.stats import qmc
-
-    make: Any = qmc.LatinHypercube
-    return np.hstack([make(dims, seed=_generator(key)).random(runs) for key, dims in keys])
+    return np.hstack([points_of("LatinHypercube", dims, _generator(key)).random(runs) for key, dims in keys])
 
 
 @lru_cache(maxsize=1)

@@ -13,7 +13,7 @@ one of them is left out give the half-widths (the jackknife over groups; A. B. O
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ from scipy import special
 Array: TypeAlias = NDArray[np.float64]
 SCRAMBLINGS = 8
 """The number of Sobol sequences in a Saltelli design; one per point where there are fewer points."""
+CONFIDENCE = 0.95
+"""That of the intervals of all indices."""
 NO_SALTELLI = "the runs are not a Saltelli design of two samples and their crossings"
 STEP_ERROR = 0.05
 """The share by which a step of a Morris design may differ from the grid's, because ends of the unit interval may be moved
@@ -51,7 +53,7 @@ class Morris:
     sigma: Array
     trajectories: int
     dropped: int
-    confidence: float
+    confidence: ClassVar[float] = CONFIDENCE
 
 
 @dataclass(frozen=True)
@@ -64,10 +66,10 @@ class Sobol:
     first_width: Array
     total: Array
     total_width: Array
-    confidence: float
+    confidence: ClassVar[float] = CONFIDENCE
 
 
-def morris(names: Sequence[str], unit: Array, values: Array, confidence: float = 0.95) -> Morris | Refused:
+def morris(names: Sequence[str], unit: Array, values: Array) -> Morris | Refused:
     """Return the elementary effects from points of the unit cube (runs, inputs) and the metric's values (runs,), NaN where a
     run has none; runs in the order of the design."""
     unit, values, size = np.asarray(unit, float), np.asarray(values, float), len(names) + 1
@@ -89,24 +91,26 @@ def morris(names: Sequence[str], unit: Array, values: Array, confidence: float =
     changes = np.diff(values.reshape(-1, size)[there], axis=1)
     effects = (changes[:, :, None] * (np.sign(steps) * moved)[there]).sum(1) / grid
     magnitudes = np.abs(effects)
-    width = special.stdtrit(kept - 1, 0.5 + 0.5 * confidence) * magnitudes.std(0, ddof=1) / math.sqrt(kept)
-    return Morris(
-        tuple(names), effects.mean(0), magnitudes.mean(0), width, effects.std(0, ddof=1), flown, flown - kept, confidence
-    )
+    width = special.stdtrit(kept - 1, 0.5 + 0.5 * CONFIDENCE) * magnitudes.std(0, ddof=1) / math.sqrt(kept)
+    return Morris(tuple(names), effects.mean(0), magnitudes.mean(0), width, effects.std(0, ddof=1), flown, flown - kept)
+
+
+def points_of(kind: str, dims: int, generator: np.random.Generator) -> Any:
+    """Return SciPy's generator of points (n, dims): "Sobol", which is scrambled, or "LatinHypercube"."""
+    from scipy.stats import qmc
+
+    # Newer versions have the keyword `seed` only at run time, and older ones only that.
+    return getattr(qmc, kind)(dims, seed=generator)
 
 
 def saltelli_design(dims: int, size: int, generator: np.random.Generator) -> Array:
     """Return `size` pairs of points, a power of 2, with the crossings of each pair, (size (2 dims + 2), dims)."""
-    from scipy.stats import qmc
-
-    # Untyped, because newer versions accept `seed` only at run time, and older ones nothing else.
-    make: Any = qmc.Sobol
     groups = min(size, SCRAMBLINGS)
-    pairs = np.vstack([make(2 * dims, scramble=True, seed=generator).random(size // groups) for _ in range(groups)])
+    pairs = np.vstack([points_of("Sobol", 2 * dims, generator).random(size // groups) for _ in range(groups)])
     return _cross(pairs[:, None, :dims], pairs[:, None, dims:]).reshape(-1, dims)
 
 
-def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 0.95) -> Sobol | Refused:
+def sobol(names: Sequence[str], unit: Array, values: Array) -> Sobol | Refused:
     """Return Sobol's indices from points of `saltelli_design` (runs, inputs) and the metric's values (runs,), NaN where a
     run has none; runs in the order of the design."""
     unit, values, count = np.asarray(unit, float), np.asarray(values, float), len(names)
@@ -129,8 +133,8 @@ def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 
     if not np.isfinite(less).all():
         return Refused("too few runs have another value than the rest")
     spread = np.sqrt((groups - 1) * less.var(0))
-    width = special.stdtrit(groups - 1, 0.5 + 0.5 * confidence) * spread
-    return Sobol(tuple(names), first, width[0], total, width[1], confidence)
+    width = special.stdtrit(groups - 1, 0.5 + 0.5 * CONFIDENCE) * spread
+    return Sobol(tuple(names), first, width[0], total, width[1])
 
 
 def _estimates(blocks: Array) -> tuple[Array, Array]:

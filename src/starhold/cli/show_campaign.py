@@ -14,13 +14,14 @@ from rich.text import Text
 from starhold.cli.console import bars_with, console
 from starhold.cli.show import print_rows, printable
 from starhold.errors import InputError
-from starhold.report.campaign_tables import Section, again, brackets, claims, drivers, indices, metrics, verdicts
+from starhold.report.campaign_tables import again, brackets, claims, drivers, indices, metrics, verdicts
 from starhold.report.campaign_units import Wording, counted, figure, headline, outcome_of
 from starhold.report.commands import Cell, coloured
 
 if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult
     from starhold.campaign.worst import Sought
+    from starhold.report.commands import Table
 
 METRICS, DRIVERS, AGAIN = 8, 4, 3
 """The numbers of metrics, of drivers of each kind, and of runs per law that are printed; the page lists all."""
@@ -87,12 +88,12 @@ def print_campaign(result: CampaignResult, body: str) -> None:
     _print(metrics(result, words, METRICS), with_note=False)
     _print(brackets(result, words), with_note=result.contradicted)
     _print(claims(result, words))
-    for section in indices(result, words):
-        _print(section)
+    for table in indices(result, words):
+        _print(table)
     for law in result.laws:
         if law.drivers is not None:
             causes = drivers(law.drivers, words, DRIVERS)
-            _print(causes._replace(heading=law.law, note=f"{law.law}: {causes.note}"))
+            _print(causes._replace(title=law.law, note=f"{law.law}: {causes.note}"))
     _print(again(result, AGAIN), with_note=False)
     console.print(f"\ndigest {result.digest}")
     if result.flown and result.seconds > 0.0:
@@ -101,17 +102,16 @@ def print_campaign(result: CampaignResult, body: str) -> None:
         console.print(flown)
 
 
-def _print(section: Section | None, columns: int | None = None, with_note: bool = True) -> None:
-    """Print the first columns of a section's table, and its note."""
-    if section is None:
+def _print(table: Table | None, columns: int | None = None, with_note: bool = True) -> None:
+    """Print the first columns of a table, and its note."""
+    if table is None:
         return
-    table = section.table
     if table.rows:
         rows = [[*map(marked, row[:columns])] for row in table.rows]
-        title = "" if section.heading == "Verdicts" else marked(section.heading)
+        title = "" if table.title == "Verdicts" else marked(table.title)
         print_rows(table._replace(columns=table.columns[:columns], rows=rows, title=title), apart=True)
-    if with_note and section.note:
-        console.print(marked(section.note))
+    if with_note and table.note:
+        console.print(marked(table.note))
 
 
 def marked(cell: Any) -> str:

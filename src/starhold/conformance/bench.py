@@ -30,10 +30,10 @@ def random_quaternions(count: int, seed: int = 7) -> list[Quaternion]:
     return [unflatten(q / np.linalg.norm(q), NO_TURN) for q in numbers]
 
 
-def random_measurements(count: int, external: bool = True, seed: int = 11) -> Iterator[Measurement]:
+def random_measurements(count: int, external: bool = True) -> Iterator[Measurement]:
     """Return a law's measurements at random states of a body with a target at rest, with or without a modelled torque."""
-    random, magnetic = np.random.default_rng(seed), np.random.default_rng(seed + 2)
-    for attitude in random_quaternions(count, seed + 1):
+    random, magnetic = np.random.default_rng(11), np.random.default_rng(13)
+    for attitude in random_quaternions(count, 12):
         rate: Vector = unflatten(random.normal(scale=0.05, size=3), ZERO)
         torque: Vector = unflatten(random.normal(scale=1e-5, size=3), ZERO) if external else ZERO
         position: Vector = unflatten(random.normal(scale=4e6, size=3), ZERO) if external else ZERO

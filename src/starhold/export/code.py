@@ -257,7 +257,7 @@ def make_code(loop: ClosedLoop, name: str) -> Code:
 
 
 def _recorded(flight: FlightLaw, recorder: Reads | Recording, values: dict[str, Any]) -> Any:
-    """Record the step; return its results."""
+    """Record the law's control step with these values and return what it computes: the command and the state after it."""
 
     def in_memory(leaf: Any) -> Any:
         if not isinstance(leaf, Buffer):

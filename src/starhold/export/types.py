@@ -62,6 +62,8 @@ def _struct(name: str, parts: list[tuple[str, Type]], elements: str = "", text: 
     return Type(name, name, tuple(Member(*part, k) for k, part in enumerate(parts)), elements, text=text)
 
 
+WIDTH = 104
+"""Of lines of comments."""
 VECTOR = _struct("vector_t", [(axis, DOUBLE) for axis in "xyz"], text="Components along the axes.")
 QUATERNION = _struct("quaternion_t", [(f"q{k}", DOUBLE) for k in range(4)], text="Scalar part first, Hamilton product.")
 MATRIX = _struct("matrix_t", [(f"row[{k}]", VECTOR) for k in range(3)], "row", "Rows of a 3x3 matrix.")
@@ -170,12 +172,12 @@ def sentence(doc: str) -> str:
     return "" if re.match(r"\w+\(.*\)$", text) else re.split(r"(?<=\.) (?=[A-Z])", text, maxsplit=1)[0]
 
 
-def wrapped(text: str, width: int = 104) -> list[str]:
+def wrapped(text: str) -> list[str]:
     """Return a text in lines."""
     lines: list[str] = []
     for line in text.replace("*/", "* /").replace("/*", "/ *").splitlines():
         indent = " " * (len(line) - len(line.lstrip()))
-        lines += textwrap.wrap(line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) or [""]
+        lines += textwrap.wrap(line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) or [""]
     return lines
 
 

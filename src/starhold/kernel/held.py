@@ -330,12 +330,12 @@ class Held(Follower):
             reach(self.felt, [sizes[name] for name in STATE])
         )
 
-    def astray(self, tube: Tube, lasting: Fraction = ZERO, drift: list[Fraction] | None = None) -> list[Fraction]:
+    def astray(self, tube: Tube, lasting: Fraction = ZERO) -> list[Fraction]:
         """Return how far the rates depart, in a period, from where the acceleration linear in the sample and that of a
-        torque `lasting` take them, while they drift so far."""
+        torque `lasting` take them."""
         sizes = tube.region.sizes | {"v": 1 - tube.region.least}
         left = [most(p, sizes) for p in self.speeding]
-        columns = zip(left, reach(tube.bent, drift or tube.drift), self.N, strict=True)
+        columns = zip(left, reach(tube.bent, tube.drift), self.N, strict=True)
         return [self.h * (a + b + (tube.push + tube.late.moved - lasting) * norm(n)) for a, b, n in columns]
 
     def corners(self) -> list[Rows]:

@@ -241,7 +241,8 @@ class AttitudeLoop(Loop):
         demand(not names, f"the motion depends on more than the state: {', '.join(sorted(names))}")
 
     def expanded(self, p: Poly, rest: Mapping[str, int]) -> Poly:
-        """Return p with inverses expanded to first order around a point where no divisor vanishes, used or not."""
+        """Return p with the inverse of each divisor expanded to first order around a rest. No divisor of the program may
+        vanish there, not even one that p does not use."""
         for z, divisor in self.divisors.items():
             d = divisor.at(rest).number
             demand(d != 0, "a program divides by zero at rest")

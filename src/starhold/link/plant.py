@@ -1,4 +1,4 @@
-"""A flight that one peer commands by messages: bytes in, bytes out, without network or clock."""
+"""A flight that one peer commands by messages: bytes in, bytes out. Transports and timers are elsewhere."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Plant:
         self.layout = Layout(flight.loop)
         fields = [[one.name, one.size] for one in self.layout.fields]
         self._about = json.dumps(about | {"steps": rules.steps, "fields": fields})
-        # So that no period waits for a compiler.
+        # Compile before the first period.
         flight.prepare()
         self._readings = flight.reset()
         self.send: Callable[[bytes], None] = lambda data: None

@@ -164,7 +164,8 @@ class Line:
 
 
 class Stream(asyncio.Protocol):
-    """A connection, or a line without one; writer: the transport for writing, if it is not the one for reading."""
+    """A byte stream: a connection, or a serial line; writer: the transport for writing, if it differs from that for
+    reading."""
 
     def __init__(self, line: Line, writer: asyncio.WriteTransport | None = None) -> None:
         self._line, self._decoder, self._writer = line, Decoder(), writer

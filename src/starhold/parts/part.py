@@ -40,7 +40,7 @@ class Part:
 
     @property
     def table(self) -> str:
-        """The table of a scenario for this part; "" if that is a [[part]] table."""
+        """The name of the scenario's table for this part; "" for a part given by a [[part]] table."""
         return getattr(self.module, "TABLE", "")
 
     @property

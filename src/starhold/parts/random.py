@@ -101,7 +101,7 @@ def to_angle(word: Word) -> Scalar:
 
 
 def _series(c: tuple[float, ...], x: Scalar) -> Scalar:
-    """Return a polynomial of six terms, computed in independent pairs."""
+    """Return c[0] + c[1] x + ... + c[5] x^5, computed in pairs of terms that do not wait for each other."""
     square = x * x
     return square * (square * (c[4] + c[5] * x) + (c[2] + c[3] * x)) + (c[0] + c[1] * x)
 

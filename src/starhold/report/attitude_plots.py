@@ -21,6 +21,7 @@ from starhold.report.plots import (
     Mark,
     Panel,
     Plot,
+    longest,
     near,
     positive,
     recorded_plots,
@@ -68,8 +69,8 @@ class AttitudePlots:
 
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: float = math.inf) -> AttitudePlots:
     """Return the plots of a comparison, each curve thinned to about `points` samples, with marks up to `end` (s)."""
-    longest = max((flight.recording["time"] for flight in flights), key=len)
-    factor = thinning(len(longest), points)
+    times = longest(flights)["time"]
+    factor = thinning(len(times), points)
 
     def curves(name: str, column: int, scale: float = 1.0) -> list[Curve]:
         return [thin(flight.recording[name][:, column] * scale, factor) for flight in flights]
@@ -85,7 +86,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
     scalar = panel("q₀", "attitude_error", 0)
     vector = [panel(f"q{'₁₂₃'[i]}", "attitude_error", i + 1) for i in range(3)]
     return AttitudePlots(
-        thin_times(longest, factor),
+        thin_times(times, factor),
         Plot("scalar", "scalar part of the error quaternion", [scalar]),
         Plot("attitude", "vector part of the error quaternion", vector),
         Plot("rate", "angular velocity relative to the target", [sound(one, flights) for one in rates]),
@@ -192,7 +193,7 @@ def _unwrapped(angles: Curve) -> Curve:
 def early(flights: Sequence[Flight]) -> float | None:
     """Return the time (s), with a small margin, by which all motions that come near the target have done so; None if it is
     most of the run, or no motion does."""
-    longest, ends = max(float(flight.recording["time"][-1]) for flight in flights), list[float]()
+    ends = list[float]()
     for flight in flights:
         run = flight.recording
         errors = error_angle(run["attitude_error"]), np.linalg.norm(run["rate_error"], axis=1)
@@ -200,7 +201,7 @@ def early(flights: Sequence[Flight]) -> float | None:
         if flight.lost is None and None not in within:
             ends.append(float(run["time"][max(place for place in within if place is not None)]))
     end = 1.2 * max(ends, default=math.inf)
-    return end if 0.0 < end <= 0.5 * longest else None
+    return end if 0.0 < end <= 0.5 * float(longest(flights)["time"][-1]) else None
 
 
 def until(flights: Sequence[Flight], end: float) -> list[Flight]:

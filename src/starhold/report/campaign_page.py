@@ -16,7 +16,7 @@ from starhold.campaign.again import fly_again
 from starhold.campaign.verdicts import percent
 from starhold.files import write_text
 from starhold.report import campaign_tables as tables
-from starhold.report.campaign_tables import Section, drivers, indices, picture
+from starhold.report.campaign_tables import drivers, indices, picture
 from starhold.report.campaign_units import Wording, count_text, flown_text, headings_of, headline, outcome_of
 from starhold.report.page_parts import beside, document, fold, plot_box, rounded, versions
 from starhold.report.plots import colour
@@ -27,6 +27,7 @@ from starhold.report.text import plain_measure
 if TYPE_CHECKING:
     from starhold.campaign.envelopes import Envelope
     from starhold.campaign.results import CampaignResult, Spread
+    from starhold.report.commands import Table
     from starhold.scenario.reading import Scenario
 
 
@@ -197,12 +198,12 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
     bound = {item.column for item in words.requirements.values()}
     leads = [*over_time[:1], *sorted(spreads, key=lambda plot: plot["metric"] not in bound)[:1]]
     sections = [
-        table_html(required.table, "told tight") if required else note("Nothing is required, so there are no verdicts."),
+        table_html(required, "told tight") if required else note("Nothing is required, so there are no verdicts."),
         _switches(result),
         beside(*(plot_box(plot, 2) for plot in leads)),
         *_headlines(result, words),
         fold("Verdicts in words", note(required.note) + _in_words(result) if required else ""),
-        fold("Runs", _shown(tables.runs(result)._replace(heading=""), fit=True)),
+        fold("Runs", _shown(tables.runs(result)._replace(title=""), fit=True)),
         fold("Distributions", _distributions([plot for plot in spreads if plot not in leads])),
         fold("Envelopes over time", _over_time([plot for plot in over_time if plot not in leads])),
         _folded(tables.metrics(result, words)),
@@ -210,7 +211,7 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
         _folded(tables.brackets(result, words)),
         _folded(tables.claims(result, words)),
         fold("What drives failures and metrics", "".join(_drivers(result, words))),
-        fold("Sensitivity indices", "".join(_shown(section, fit=True) for section in indices(result, words))),
+        fold("Sensitivity indices", "".join(_shown(table, fit=True) for table in indices(result, words))),
         _folded(tables.dispersions(result)),
         fold("Results", _store(result, words)),
         fold("How to read this page", _reading()),
@@ -228,15 +229,15 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
     return document(scenario, sections, data, ["campaign.js"], f"{versions()}.", flown_text(result), outcomes)
 
 
-def _folded(section: Section | None) -> str:
-    """Return a section as a fold that the reader may open."""
-    return "" if section is None else fold(section.heading, _shown(section._replace(heading="")))
+def _folded(table: Table | None) -> str:
+    """Return a table as a fold that the reader may open."""
+    return "" if table is None else fold(table.title, _shown(table._replace(title="")))
 
 
-def _shown(section: Section, fit: bool = False) -> str:
-    """Return a section as HTML."""
-    head = f"<h3>{escape(section.heading)}</h3>\n" if section.heading else ""
-    return f"{head}{table_html(section.table, fit=fit) if section.table.rows else ''}\n{note(section.note)}"
+def _shown(table: Table, fit: bool = False) -> str:
+    """Return a table with its title and its note as HTML."""
+    head = f"<h3>{escape(table.title)}</h3>\n" if table.title else ""
+    return f"{head}{table_html(table, fit=fit) if table.rows else ''}\n{note(table.note)}"
 
 
 def _headlines(result: CampaignResult, words: Wording) -> Iterator[str]:

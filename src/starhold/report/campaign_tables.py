@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from starhold.campaign.verdicts import percent
 from starhold.report.campaign_units import (
@@ -32,14 +32,6 @@ if TYPE_CHECKING:
     from starhold.report.campaign_units import Measure
 
 
-class Section(NamedTuple):
-    """A table with its heading and a note."""
-
-    heading: str
-    table: Table
-    note: str = ""
-
-
 def numbers(*names: str) -> list[Column]:
     """Return columns of numbers, aligned right, with these headings; "|" begins the second line of a heading."""
     return [Column(name, below, ">") for name, _, below in (one.partition("|") for one in names)]
@@ -50,7 +42,7 @@ def law_cell(result: CampaignResult, number: int) -> Cell:
     return Cell(result.laws[number].law, "law", number)
 
 
-def verdicts(result: CampaignResult, words: Wording) -> Section | None:
+def verdicts(result: CampaignResult, words: Wording) -> Table | None:
     """Return a table with a row for each requirement and law; None where nothing is required."""
     rows: list[list[Any]] = []
     ends: set[int] = set()
@@ -71,7 +63,7 @@ def verdicts(result: CampaignResult, words: Wording) -> Section | None:
         *numbers(f"failure probability|{'whenever stopped' if stopped else 'Clopper–Pearson'}"),
         *numbers("worst margin|and its run", "margin kept|by the required share"),
     ]
-    return Section("Verdicts", Table(columns, rows, ends=ends), " ".join(_conditions(result)))
+    return Table(columns, rows, "Verdicts", ends=ends, note=" ".join(_conditions(result)))
 
 
 def _verdict(verdict: Verdict, words: Wording) -> list[Any]:
@@ -99,7 +91,7 @@ def _conditions(result: CampaignResult) -> list[str]:
     return sentences
 
 
-def runs(result: CampaignResult) -> Section:
+def runs(result: CampaignResult) -> Table:
     """Return a table of the numbers of lost and of failed runs of each law."""
 
     def of_runs(number: int, among: int) -> str:
@@ -110,10 +102,10 @@ def runs(result: CampaignResult) -> Section:
         for number, law in enumerate(result.laws)
     ]
     note = "Lost: the motion diverged and has no final values. Failed: lost, or misses a requirement."
-    return Section("Runs", Table([Column("law"), *numbers("runs", "lost", "failed")], rows), note)
+    return Table([Column("law"), *numbers("runs", "lost", "failed")], rows, "Runs", note=note)
 
 
-def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> Section | None:
+def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> Table | None:
     """Return a table of the distribution of each metric for each law, required metrics first; most: of how many metrics."""
     headings, required = headings_of(result, words), {item.column for item in words.requirements.values()}
     rows: list[list[Any]] = []
@@ -134,10 +126,10 @@ def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> 
         return None
     heads = numbers("least", "5 %", "median", "95 %", "largest", "mean", "without|value")
     note = "Over the runs that have the metric; a run that is lost, or never settles, has none."
-    return Section("Metrics", Table([*map(Column, ("metric", "unit", "law")), *heads], rows, ends=ends), note)
+    return Table([*map(Column, ("metric", "unit", "law")), *heads], rows, "Metrics", ends=ends, note=note)
 
 
-def again(result: CampaignResult, most: int) -> Section | None:
+def again(result: CampaignResult, most: int) -> Table | None:
     """Return a table of runs worth flying again, at most `most` of each law, with the commands."""
     rows = [
         [law_cell(result, number), str(item.run), item.why, Cell(item.command, "typed")]
@@ -150,10 +142,10 @@ def again(result: CampaignResult, most: int) -> Section | None:
     more = f" {counted(left, 'further run')} are not listed." if left else ""
     note = f"The command flies the run again, bit for bit, and writes its full series, pictures and page.{more}"
     columns = [Column("law"), *numbers("run"), Column("why"), Column("command")]
-    return Section("Runs worth flying again", Table(columns, rows), note)
+    return Table(columns, rows, "Runs worth flying again", note=note)
 
 
-def brackets(result: CampaignResult, words: Wording) -> Section | None:
+def brackets(result: CampaignResult, words: Wording) -> Table | None:
     """Return a table of the worst value flown and the bound proved for each metric."""
     rows: list[list[Any]] = []
     faults: list[str] = []
@@ -175,10 +167,10 @@ def brackets(result: CampaignResult, words: Wording) -> Section | None:
     )
     columns = [*map(Column, ("metric", "law")), *numbers("flown ≤ true ≤ proved")]
     columns += [*map(Column, ("proved by", "looked for by", "flown by"))]
-    return Section("Worst cases: flown ≤ true ≤ proved", Table(columns, rows), " ".join([*faults, note]))
+    return Table(columns, rows, "Worst cases: flown ≤ true ≤ proved", note=" ".join([*faults, note]))
 
 
-def claims(result: CampaignResult, words: Wording) -> Section | None:
+def claims(result: CampaignResult, words: Wording) -> Table | None:
     """Return a table of the metrics bounded by the claim about each loop as it flies, for flights that meet its premises;
     None where no proof was requested."""
     rows: list[list[Any]] = []
@@ -195,7 +187,7 @@ def claims(result: CampaignResult, words: Wording) -> Section | None:
     if not sentences:
         return None
     columns = [*map(Column, ("metric", "law")), *numbers("worst flown ≤ proved", "flights beyond")]
-    return Section("Proved of the loop as it flies", Table(columns, rows), " ".join(sentences))
+    return Table(columns, rows, "Proved of the loop as it flies", note=" ".join(sentences))
 
 
 def _claimed(claim: ByClaim) -> str:
@@ -212,17 +204,17 @@ def _claimed(claim: ByClaim) -> str:
     return f"{share}, and measurement errors exceed its assumption in {count_text(claim.misled)} of these."
 
 
-def dispersions(result: CampaignResult) -> Section | None:
+def dispersions(result: CampaignResult) -> Table | None:
     """Return a table of the dispersed keys with their distributions."""
     rows = [[key, how] for key, how in result.over.items()]
-    return Section("Dispersions flown", Table([Column("key"), Column("distribution")], rows)) if rows else None
+    return Table([Column("key"), Column("distribution")], rows, "Dispersions flown") if rows else None
 
 
 UP, DOWN, BOTH = "213,94,0", "0,114,178", "123,63,160"
 """The colours (red, green, blue) of effects that increase, decrease, or otherwise change with an input."""
 
 
-def drivers(causes: Drivers, words: Wording, most: int) -> Section:
+def drivers(causes: Drivers, words: Wording, most: int) -> Table:
     """Return a table of the drivers of failures and metrics of a law, at most `most` of each kind."""
     kinds = [
         [_failure(item) for item in causes.inputs if item.significant],
@@ -238,7 +230,7 @@ def drivers(causes: Drivers, words: Wording, most: int) -> Section:
     if causes.skipped:
         sentences.append(f"Not tested, because they are constant or lack values: {', '.join(causes.skipped)}.")
     columns = [*map(Column, ("what happens", "with", "how", "strength")), *numbers("p, corrected")]
-    return Section("", Table(columns, rows), " ".join(sentences))
+    return Table(columns, rows, note=" ".join(sentences))
 
 
 def _failure(item: FailureDriver) -> list[Any]:
@@ -270,26 +262,24 @@ def _chance(item: FailureDriver | PairDriver | MetricDriver) -> str:
     return f"{item.corrected:.2g}" if item.corrected > 1e-300 else "< 1e-300"
 
 
-def indices(result: CampaignResult, words: Wording) -> list[Section]:
+def indices(result: CampaignResult, words: Wording) -> list[Table]:
     """Return tables of the sensitivity indices of each law's metrics, or the reasons why there are none; empty where none
     were requested."""
     from starhold.campaign.sensitivity import Morris, Refused
 
-    sections: list[Section] = []
+    shown: list[Table] = []
     for law in result.laws:
         for metric, outcome in law.indices.items():
             measure = words.measure(metric)
             heading = f"{law.law}: {measure.heading}"
             if isinstance(outcome, Refused):
-                sections.append(Section(heading, Table([], []), f"No sensitivity indices: {outcome.reason}."))
+                shown.append(Table([], [], heading, note=f"No sensitivity indices: {outcome.reason}."))
             else:
-                sections.append(
-                    _morris(outcome, measure, heading) if isinstance(outcome, Morris) else _sobol(outcome, heading)
-                )
-    return sections
+                shown.append(_morris(outcome, measure, heading) if isinstance(outcome, Morris) else _sobol(outcome, heading))
+    return shown
 
 
-def _morris(effects: Morris, measure: Measure, heading: str) -> Section:
+def _morris(effects: Morris, measure: Measure, heading: str) -> Table:
     most, scale = max(map(abs, effects.mu_star), default=0.0) or 1.0, measure.scale
     rows = [
         [
@@ -307,17 +297,17 @@ def _morris(effects: Morris, measure: Measure, heading: str) -> Section:
         note += f" {effects.dropped} of {effects.trajectories} trajectories were dropped, because they contain failed runs."
     columns = [Column("input"), Column("mean magnitude μ*", measure.unit)]
     columns += numbers(f"mean μ|{measure.unit}", f"spread σ|{measure.unit}")
-    return Section(heading, Table(columns, rows), note)
+    return Table(columns, rows, heading, note=note)
 
 
-def _sobol(shares: Sobol, heading: str) -> Section:
+def _sobol(shares: Sobol, heading: str) -> Table:
     kinds = ((shares.first, shares.first_width), (shares.total, shares.total_width))
     rows = [
         [shares.names[i], *(Cell(_with_width(share[i], width[i]), "share", share[i]) for share, width in kinds)]
         for i in _strongest(shares.total)
     ]
     note = f"Shares of the metric's variance; ± holds with {percent(shares.confidence)} confidence."
-    return Section(heading, Table([*map(Column, ("input", "by itself", "with all others"))], rows), note)
+    return Table([*map(Column, ("input", "by itself", "with all others"))], rows, heading, note=note)
 
 
 def _with_width(value: float, width: float, scale: float = 1.0) -> str:

@@ -20,10 +20,12 @@ from starhold.report.plots import (
     Panel,
     Plot,
     colour,
+    longest,
     near,
     positive,
     recorded_plots,
     sound,
+    strided,
     thin,
     thin_times,
     thinning,
@@ -107,9 +109,8 @@ def phase_portrait(flights: Sequence[Flight], entries: Sequence[LawEntry], scena
         guides.append(Guide(np.array([-axis.saddle, axis.saddle]), np.zeros(2), "saddles", shade, "points"))
     lines: list[Line] = []
     for flight, entry in zip(flights, entries, strict=True):
-        every = max(1, -(-len(flight.recording["time"]) // PATH))
-        state = flight.recording["position"][::every, 0], flight.recording["velocity"][::every, 0] / first.s
-        lines.append(Line(*state) if entry in resting else Line(np.empty(0), np.empty(0)))
+        place, speed = (strided(flight.recording[name], PATH)[:, 0] for name in ("position", "velocity"))
+        lines.append(Line(place, speed / first.s) if entry in resting else Line(np.empty(0), np.empty(0)))
     name = f"x'/{first.s:.3g}, lengths"
     plane = Plane("x, lengths", name, lines, guides, (-size, size, -size, size))
     note = (
@@ -146,21 +147,21 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> PathP
     """Return the plots of a comparison, with curves over time thinned to about `points` samples."""
     entries = [scenario.pick(flight.name) for flight in flights]
     units = scenario.table.libration.units
-    longest = max((flight.recording["time"] for flight in flights), key=len)
-    factor = thinning(len(longest), points)
-    clock, tick = ("years", YEAR) if longest[-1] * units.time > LONG else ("days", DAY)
+    times = longest(flights)["time"]
+    factor = thinning(len(times), points)
+    clock, tick = ("years", YEAR) if times[-1] * units.time > LONG else ("days", DAY)
     goals = [goal_of(entry.gains) for entry in entries]
     rings = sorted({goal.radius for goal in goals if isinstance(goal, CircleGoal)})
     portrait = phase_portrait(flights, entries, scenario)
     return PathPlots(
-        thin_times(longest, factor) * (units.time / tick),
+        thin_times(times, factor) * (units.time / tick),
         [
             _away(flights, entries, factor, scenario, clock),
             _control(flights, entries, factor, scenario, clock),
             *(replace(plot, clock=clock) for plot in recorded_plots(flights, factor, Sample._fields)),
         ],
         [_projections(flights, entries, scenario), *([] if portrait is None else [portrait])],
-        [_path(flight.recording["position"]) for flight in flights],
+        [strided(flight.recording["position"], PATH) for flight in flights],
         rings,
         unit_text(scenario),
     )
@@ -170,10 +171,6 @@ def unit_text(scenario: Scenario) -> str:
     """Return the name of the unit of length."""
     length = scenario.table.libration.units.length
     return "Earth diameters" if length == EARTH_DIAMETER else f"units of {length / 1e3:g} km"
-
-
-def _path(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return values[:: max(1, -(-len(values) // PATH))]
 
 
 def _away(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int, scenario: Scenario, clock: str) -> Plot:
@@ -221,8 +218,8 @@ def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenari
     radii = sorted({goal.radius for goal in goals if isinstance(goal, CircleGoal)})
     size = max([*radii, *(max(map(abs, goal.at(0.0)[0])) for goal in goals)]) or 1.0
     kept = [flight for flight in flights if flight.lost is None]
-    places = [_path(flight.recording["position"]) for flight in flights]
-    controls = [_path(flight.recording["control"]) for flight in flights]
+    places = [strided(flight.recording["position"], PATH) for flight in flights]
+    controls = [strided(flight.recording["control"], PATH) for flight in flights]
     sound_places = [place for place, flight in zip(places, flights, strict=True) if flight in kept]
 
     def reach(column: int) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from starhold.report.figures import headed, plain, width_of
 from starhold.report.page_parts import rounded
-from starhold.report.plots import Curve, colour
+from starhold.report.plots import Curve, colour, strided
 from starhold.studies.flight import Flight
 
 CORNERS = 181
@@ -138,4 +138,4 @@ def _guide_data(guide: Guide) -> dict[str, Any]:
 
 
 def _thin(values: Any, most: int = PATH) -> list[float | None]:
-    return rounded(values[:: max(1, -(-len(values) // most))], 4)
+    return rounded(strided(values, most), 4)

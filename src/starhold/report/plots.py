@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.simulation.lane import Recording
 from starhold.studies.flight import Flight
 
 COLOURS = (
@@ -102,6 +103,11 @@ def thinning(count: int, points: int) -> int:
     return 1 if count <= points else int(np.ceil(2 * count / points))
 
 
+def strided(values: Any, most: int) -> Any:
+    """Return every k-th of the values, with the least k that leaves at most `most`."""
+    return values[:: max(1, -(-len(values) // most))]
+
+
 def thin(values: Curve, factor: int) -> Curve:
     """Return two of every `factor` samples, to be drawn over `thin_times`. Where omitted samples exceed those kept, the
     minimum and maximum replace them, so chatter keeps its amplitude and shifts by less than `factor` periods."""
@@ -161,16 +167,21 @@ def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
     return replace(panel, span=span)
 
 
+def longest(flights: Sequence[Flight]) -> Recording:
+    """Return the recording with the most samples, whose times all curves share."""
+    return max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
+
+
 def recorded_plots(
     flights: Sequence[Flight], factor: int, known: Container[str] = (), readers: tuple[str, ...] = ()
 ) -> list[Plot]:
     """Return a plot of each further quantity that all flights record, with a panel per component and the name, unit and
     meaning that its part declares. Flags of new readings are not drawn. readers: prefixes of the names of outputs of sensors
     and estimators."""
-    longest = max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
-    _, coordinates = longest.variables()
+    lead = longest(flights)
+    _, coordinates = lead.variables()
     plots: list[Plot] = []
-    for name, (unit, meaning, dimension) in longest.columns.items():
+    for name, (unit, meaning, dimension) in lead.columns.items():
         if name in known or name.endswith(FLAG) or not all(name in flight.recording.arrays for flight in flights):
             continue
         runs = [np.reshape(flight.recording[name], (len(flight.recording["time"]), -1)) for flight in flights]
@@ -187,5 +198,5 @@ def recorded_plots(
         title = f"{name.replace('_', ' ')}: {meaning}"
         acts = unit in ACTING or name in ("command", "control")
         topic = "Sensors and estimate" if name.startswith(readers) else "Actuators" if acts else "Motion"
-        plots.append(Plot(name.replace("_", "-"), title, shown, "", name == "command", longest.time_unit, topic))
+        plots.append(Plot(name.replace("_", "-"), title, shown, "", name == "command", lead.time_unit, topic))
     return plots

@@ -42,7 +42,6 @@ from starhold.studies.body import study_of
 if TYPE_CHECKING:
     from starhold.campaign.verify import Review
     from starhold.certification.certificate import Certificate
-    from starhold.report.campaign_tables import Section as Told
 
 MISSION, ASSUMPTIONS, REQUIREMENTS = "Mission and configuration", "Assumptions", "Requirements"
 POINTING, MARGINS, CAMPAIGN = "Pointing and momentum", "Margins", "Campaign"
@@ -276,13 +275,13 @@ def _campaign(review: Review) -> Iterator[Piece]:
     law, words = result.laws[0], Wording.of(review.evidence.scenario.body, result)
     yield f"{flown_text(result)[:1].upper()}{flown_text(result)[1:]}"
     yield f"{law.law} {headline(law, result.sampling, words)}"
-    shown: list[Told | None] = [tables.verdicts(result, words), tables.runs(result), tables.metrics(result, words)]
+    shown: list[Table | None] = [tables.verdicts(result, words), tables.runs(result), tables.metrics(result, words)]
     shown += [tables.dispersions(result), *tables.indices(result, words)]
     if law.drivers is not None:
         shown.append(tables.drivers(law.drivers, words, DRIVERS)._replace(heading="What drives failures and metrics"))
     for one in shown:
-        if one is not None and one.table.rows:
-            yield one.table._replace(rows=_safe_rows(one.table.rows), title=one.heading)
+        if one is not None and one.rows:
+            yield one._replace(rows=_safe_rows(one.rows))
         if one is not None and one.note:
             yield one.note
     if law.drivers is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 import tomllib
@@ -18,7 +17,7 @@ from pydantic_core import PydanticCustomError
 
 from starhold.algebra.quaternion import normalise
 from starhold.algebra.vector import scale
-from starhold.errors import InputError, is_interrupt
+from starhold.errors import InputError, closest, is_interrupt
 from starhold.laws.catalogue import Law, error_line, from_file
 from starhold.loop.kernels import form, make_step
 from starhold.scenario.tables import check_name
@@ -346,5 +345,4 @@ def nearest(word: str, known: list[str]) -> str:
     """Return a hint for an unknown word: the new name of a renamed one, else the nearest known word, else all of them."""
     if (new := RENAMED.get(word)) in known:
         return f"{new}, its new name"
-    near = difflib.get_close_matches(word[:100], known, n=1, cutoff=0.6)
-    return f"did you mean {near[0]}?" if near else f"one of {', '.join(sorted(known))}"
+    return closest(word, sorted(known))

@@ -23,7 +23,7 @@ import numpy as np
 
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.vector import Vector, add
-from starhold.errors import InputError
+from starhold.errors import InputError, optional
 from starhold.export.aem import SECOND, instant_of
 from starhold.export.oem import Oem, parse_oem
 from starhold.files import read_text
@@ -151,10 +151,8 @@ def with_orbit(data: Mapping[str, Any], folder: Path, where: str) -> Mapping[str
         raise InputError(where, f"orbit.{other}", f"a key beside {kind}", f"{kind} alone, or with {' and '.join(BESIDE)}")
     if not isinstance(table[kind], str):
         raise InputError(where, key, show(table[kind]), f"the name of {ALLOWED[kind]}")
-    try:
-        import_module("json" if kind == "oem" else "sgp4.api")
-    except ImportError:
-        raise InputError(where, key, "no package sgp4", "pip install 'starhold[orbits]'") from None
+    if kind != "oem":
+        optional("sgp4.api", f"{where}: {key}", "orbits")
     path = folder / table[kind]
     try:
         elements = READERS[kind](path)

@@ -7,10 +7,10 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape, unescape
-from importlib import import_module, resources
+from importlib import resources
 from typing import Any
 
-from starhold.errors import InputError
+from starhold.errors import InputError, optional
 from starhold.scenario.checking import show
 from starhold.scenario.requirement import key_of
 
@@ -21,10 +21,7 @@ ENUMERATION, XHTML = "ENUMERATION", "XHTML"
 
 
 def _module(name: str, where: str) -> Any:
-    try:
-        return import_module(f"reqif.{name}")
-    except ImportError:
-        raise InputError(where, "", "a ReqIF file, and no package reqif", "pip install 'starhold[requirements]'") from None
+    return optional(f"reqif.{name}", f"{where}: ReqIF", "requirements")
 
 
 def _parsed(data: bytes, where: str) -> Any:

@@ -14,6 +14,7 @@ from starhold.errors import InputError
 from starhold.files import atomic_write
 from starhold.scenario import reqif
 from starhold.scenario.checking import show, validate
+from starhold.scenario.csv_files import number_in
 from starhold.scenario.requirement import KEYS, RequirementTable, key_of
 
 NUMBERS = ("at_most", "at_least", "after", "share", "confidence")
@@ -111,15 +112,9 @@ def _table(row: Mapping[str, str], key: str, where: str) -> dict[str, Any]:
                     where, f"{key}.{name}", show(text), 'a list such as [0, 0, 1] or ["1 min", "2 min"]'
                 ) from None
         else:
-            table[name] = _number(text) if name in NUMBERS else text.strip() if name != "text" else text
+            number = number_in(text) if name in NUMBERS else None
+            table[name] = text if name == "text" else text.strip() if number is None else number
     return table | ({"attributes": more} if more else {})
-
-
-def _number(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text.strip()
 
 
 def _row(table: RequirementTable) -> dict[str, str]:

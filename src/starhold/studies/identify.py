@@ -72,7 +72,7 @@ class Identified:
 
     @property
     def consistent(self) -> float:
-        """The probability of a sum of squares at least as large, if the noise is as stated."""
+        """The probability of a chi-squared statistic at least as large as this one, if the noise is as stated."""
         return float(stats.chi2.sf(self.chi2, self.degrees))
 
     @property

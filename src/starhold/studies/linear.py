@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from starhold.analysis.linear import COMMAND, DISTURBANCE, Linear, LinearityError, System, closed, in_series, linearise
 from starhold.analysis.margins import Margins, margins
-from starhold.errors import InputError
+from starhold.errors import InputError, optional
 from starhold.scenario.building import build
 
 if TYPE_CHECKING:
@@ -65,10 +64,7 @@ def margins_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> list[
 
 def systems_of(linear: Linear) -> LinearLoop:
     """Return the linear loop as systems of python-control. InputError where that is not installed."""
-    try:
-        control = import_module("control")
-    except ImportError:
-        raise InputError("linearise", "", "no python-control", "pip install 'starhold[interop]'") from None
+    control = optional("control", "linearise", "interop")
     plant = _delayed(linear.plant, linear.delay, control)
     stepped = _systems(linear.stepped, linear.stepped_law, control)
     continuous = _systems(plant, linear.law, control)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from starhold.algebra.polynomial import Polynomial
+from starhold.algebra.structure import runge_kutta
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.invariant import InvariantProblem, System, WantedSet
 from starhold.certification.invariant.search import Candidate, Values
@@ -63,16 +64,13 @@ def paths(system: System, box: Sequence[tuple[float, float]], starts: Any, lengt
         rates, _ = what.rates(np.array([*state, *others]))
         return rates / np.maximum(np.linalg.norm(rates, axis=0), TINY)
 
-    step, state, going = length / steps, np.array(starts, dtype=float), np.ones(count)
-    states, a = [state], heading(state)
+    step, state, going, advance = length / steps, np.array(starts, dtype=float), np.ones(count, bool), runge_kutta(heading)
+    states, before = [state], heading(state)
     for _ in range(steps):
-        b = heading(state + 0.5 * step * a)
-        c = heading(state + 0.5 * step * b)
-        d = heading(state + step * c)
-        ahead = state + going * step / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-        turned = heading(ahead)
-        going = going * ((a * turned).sum(axis=0) > 0.0)
-        state, a = np.where(going > 0.0, ahead, state), turned
+        ahead = advance(state, step)
+        after = heading(ahead)
+        going &= (before * after).sum(axis=0) > 0.0
+        state, before = np.where(going, ahead, state), after
         states.append(state)
     return np.stack(states, axis=-1).swapaxes(0, 1)
 

@@ -173,10 +173,10 @@ class Station:
         mirror = self.specular if specular is None else specular
         return self.peak(rate) / (self.pressure * ball(mirror, min(self.diffuse, 1.0 - mirror)).radius)
 
-    def margin(self, area: float, mass: float, rate: float | None = None) -> float:
+    def margin(self, area: float, mass: float) -> float:
         """Return the control from a sail of this area (m2) on a craft of this mass (kg), as a multiple of the circle's
         demand."""
-        return area / (mass * self.area_per_mass(rate))
+        return area / (mass * self.area_per_mass())
 
     def peak_full(self, field: Field) -> float:
         """Return the peak demand (m/s2) at the best rate around the circle in a given field, with the circle moved towards

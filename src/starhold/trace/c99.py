@@ -61,11 +61,6 @@ class C99(Source):
     types: ClassVar[dict[str, str]] = TYPES
     taken = frozenset(name + end for name in _MATH.split() for end in ("", "f", "l")) | frozenset((*_STRING.split(), "main"))
 
-    @property
-    def prototype(self) -> str:
-        """Return the declaration of the function to call, for a header."""
-        return self._head(self.program.main).replace(TIE, " ") + ";"
-
     def _opening(self) -> list[str]:
         called = helpers("\n".join(self.lines))
         lines = ["#include <math.h>", "#include <stdint.h>", *["#include <string.h>"] * bool(called), "", GUARD]

@@ -247,7 +247,8 @@ def falling(loop: Loop, words: list[str], s: float, epsilon: float, tolerance: f
 
 
 def made(loop: Loop, tolerance: float, s: float, epsilon: float) -> tuple[str, dict[str, Any]]:
-    """Return this V, and the numbers of the claim with it."""
+    """Return V with stiffness s and cross term epsilon, and the numbers of a claim that uses it: a level set, and the
+    starts in it, for laws that choose the quaternion's sign."""
     J, V, signs = tensor(loop.loop.craft.inertia), loop.crossed(s, epsilon), sign_words(loop.loop)
     most = (float(np.linalg.eigvalsh(J)[-1]) + tolerance * float(np.trace(J))) * (1.0 + 1e-9)
     numbers: dict[str, Any] = {"tolerance": tolerance, "lean": epsilon, "inertia.most": most}

@@ -36,9 +36,8 @@ Array = NDArray[np.float64]
 
 RARELY = Fraction(27, 10_000)
 """The share of orbits in which errors may leave their radii."""
-WIDER, LEAST, MORE, DIGITS = 1e-6, 1e-30, 1.0 + 1e-9, 9
-"""The share by which the covariance is inflated at each step, and its minimum; the margin for rounding; and the digits of
-covariances, because long numbers take long."""
+WIDER, LEAST, MORE = 1e-6, 1e-30, 1.0 + 1e-9
+"""The share by which the covariance is inflated at each step, and its minimum; and the margin for rounding."""
 
 
 SHARES = (0.05, 0.05, 0.05, 0.8499, 1e-4)

@@ -11,6 +11,7 @@ from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
 from itertools import combinations
+from math import prod
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -113,12 +114,7 @@ class Guess:
 
     def scaled(self, q: Poly) -> Poly:
         """Return a polynomial in scaled units."""
-        terms: Terms = {}
-        for m, c in q.terms.items():
-            for x in m:
-                c = c * self.scale[x]
-            terms[m] = c
-        return Poly(terms)
+        return Poly({m: prod((self.scale[x] for x in m), start=c) for m, c in q.terms.items()})
 
     def reduce(self) -> None:
         """Leave out monomials that cannot have a square: nothing else contains it, or everything that does has its sign."""
@@ -266,12 +262,7 @@ class Guess:
 
     def unscaled(self, q: Poly) -> Poly:
         """Return a polynomial of scaled variables in the variables."""
-        terms: Terms = {}
-        for m, c in q.terms.items():
-            for x in m:
-                c = c / self.scale[x]
-            terms[m] = c
-        return Poly(terms)
+        return Poly({m: c / prod(self.scale[x] for x in m) for m, c in q.terms.items()})
 
 
 def divided(o: Sum, *more: Any) -> dict[str, Any] | None:

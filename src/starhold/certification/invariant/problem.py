@@ -1,6 +1,5 @@
 """A system and claims about it, from a TOML file or from Python, and their common certificate."""
 
-import difflib
 import json
 import keyword
 import tomllib
@@ -17,7 +16,7 @@ from starhold.certification.evidence.finding import certificate as kernel_certif
 from starhold.certification.invariant.system import TURNED, System, check_sizes, turned
 from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
 from starhold.certification.invariant.theorems import ATTRACTING, THEOREMS, Shown, WantedSet, a_state, indicator, show
-from starhold.errors import InputError, expect
+from starhold.errors import InputError, closest, expect
 from starhold.files import read_text
 
 MOVING, MOST, LARGEST, LONGEST = 7, 9, 1e100, 100
@@ -86,7 +85,7 @@ def load(source: str | Path) -> InvariantProblem:
     try:
         text = read_text(path)
     except FileNotFoundError:
-        known = _nearest(str(source), builtin_names())
+        known = closest(str(source), builtin_names())
         raise InputError(str(source), "", "no such file", f"a file with a system, or a built-in one: {known}") from None
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is no text in UTF-8"
@@ -175,7 +174,7 @@ class _File:
         self._known(table, _CLAIM, key)
         theorem = self._required(table, "theorem", key)
         if theorem not in THEOREMS:
-            raise InputError(self.where, f"{key}.theorem", _show(theorem), _nearest(str(theorem), THEOREMS))
+            raise InputError(self.where, f"{key}.theorem", _show(theorem), closest(str(theorem), THEOREMS))
         V = self._indicator(self._required(table, "V", key), theorem, f"{key}.V")
         at = self._state(table["equilibrium"], f"{key}.equilibrium") if "equilibrium" in table else None
         escape = self._polynomial(table["escape"], f"{key}.escape") if "escape" in table else None
@@ -302,7 +301,7 @@ class _File:
     def _known(self, table: dict[str, Any], names: Sequence[str], key: str) -> None:
         for name in table:
             if name not in names:
-                raise InputError(self.where, f"{key}.{name}".lstrip("."), "an unknown key", _nearest(name, names))
+                raise InputError(self.where, f"{key}.{name}".lstrip("."), "an unknown key", closest(name, names))
 
     def _required(self, table: dict[str, Any], name: str, key: str) -> Any:
         if name not in table:
@@ -346,8 +345,3 @@ def _show(value: Any) -> str:
         text = "what is too long to show"
     text = " ".join(text.split())
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _nearest(word: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
-    return f"did you mean {near[0]}?" if near else f"one of {', '.join(known)}"

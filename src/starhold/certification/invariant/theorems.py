@@ -189,7 +189,7 @@ class _Proof:
     def attempt(
         self, theorem: str, numbers: dict[str, Fraction], taken: tuple[str, ...] = (), within: bool = True
     ) -> Attempt:
-        """Return a claim for the kernel without evidence, of the box, or of all states."""
+        """Return a claim still without evidence, about the states of the box (`within`) or about all states."""
         wanted, system = self.wanted, self.what.system
         box = dict(zip(system.names, wanted.box, strict=True))
         subject = search.sides(system.names, wanted.box)

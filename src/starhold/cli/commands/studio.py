@@ -1,14 +1,11 @@
 """The command that serves the studio."""
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from starhold.errors import InputError
-
-EXTRA = "pip install 'starhold[studio]'"
+from starhold.errors import InputError, optional
 
 
 def studio(
@@ -24,8 +21,8 @@ def studio(
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
     from starhold.scenario.writing import template_text
 
-    if find_spec("starlette") is None or find_spec("uvicorn") is None:
-        raise InputError("studio", "", "no starlette and uvicorn installed", EXTRA)
+    for name in ("starlette", "uvicorn"):
+        optional(name, "studio", "studio")
     if not 0 <= port < 65536:
         raise InputError("studio", "--port", str(port), "0 to 65535")
     path, name, text = None, "mine.toml", template_text("rigid-body")

@@ -106,8 +106,8 @@ def points_with_appendages(claim: Claim) -> Proof:
 
 
 def responds(motion: Appended, weights: object, gains: object) -> Part[Response]:
-    """The gains bound those of the linear motion of body and appendages: of rates, turns and the linear acceleration, under
-    external torques, which vary freely within a period, and under held torque errors."""
+    """The gains are at least those of the linear motion of body and appendages, for rates, turns and linear acceleration:
+    from external torques that vary freely within a period, and from torque errors that are held over it."""
     return summed(scalar(1, motion.n)[:6] + motion.pull, PARTS, motion.sampled, motion.ways, KINDS, weights, gains, True)
 
 

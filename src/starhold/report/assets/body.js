@@ -69,11 +69,9 @@ const toBody = (p) => [0, 1, 2].map((i) => dot(scene.axes[i], p));
 
 // The direction of the Earth at a frame, in target axes.
 function toEarth(where) {
-  const k = Math.min(Math.floor(where), scene.earth.length - 1);
-  const b = scene.earth[Math.min(k + 1, scene.earth.length - 1)];
-  const mixed = scene.earth[k].map((c, i) => c + (where - k) * (b[i] - c));
-  const size = Math.hypot(...mixed) || 1;
-  return mixed.map((c) => c / size);
+  const toward = mix(scene.earth, where);
+  const size = Math.hypot(...toward) || 1;
+  return toward.map((c) => c / size);
 }
 
 // The third axis of the orbital frame points at the Earth, down in the picture, so the view is half a turn about the first axis.
@@ -171,20 +169,10 @@ function paint(view, where) {
   // The arrow starts at the edge of the central area and is longer than the axes, along which it may run.
   function drawEarth() {
     const colour = css("--soft");
-    line(earth.map((c) => 1.5 * c), earth.map((c) => 1.66 * c), colour, 2, []);
-    const [x1, y1] = flat(earth.map((c) => 1.5 * c));
-    const [x2, y2] = flat(earth.map((c) => 1.66 * c));
-    const long = Math.hypot(x2 - x1, y2 - y1);
-    const [ux, uy] = long > 0 ? [(x2 - x1) / long, (y2 - y1) / long] : [0, 1];
-    if (long > 4) {
-      pen.beginPath();
-      pen.moveTo(x2 + 6 * ux, y2 + 6 * uy);
-      pen.lineTo(x2 - 4 * uy, y2 + 4 * ux);
-      pen.lineTo(x2 + 4 * uy, y2 - 4 * ux);
-      pen.closePath();
-      pen.fillStyle = colour;
-      pen.fill();
-    }
+    const [root, tip] = [1.5, 1.66].map((far) => earth.map((c) => far * c));
+    line(root, tip, colour, 2, []);
+    const [x2, y2] = flat(tip);
+    const [ux, uy] = arrowHead(pen, flat(root), [x2, y2], colour, 6, 4);
     pen.font = "13px system-ui, sans-serif";
     pen.textAlign = "center";
     pen.textBaseline = "middle";
@@ -199,12 +187,12 @@ function paint(view, where) {
   function cells(c, face, part) {
     const first = face.way > 0 ? (face.axis + 1) % 3 : (face.axis + 2) % 3;
     const counts = first === part.long ? [5, 3] : [3, 5];
-    const mix = (a, b, s) => plus(a.map((v) => v * (1 - s)), b, s);
+    const point = (a, b, s) => plus(a.map((v) => v * (1 - s)), b, s);
     for (let n = 1; n < counts[0]; n++) {
-      line(mix(c[0], c[1], n / counts[0]), mix(c[3], c[2], n / counts[0]), "rgba(200, 215, 255, 0.45)", 0.8, []);
+      line(point(c[0], c[1], n / counts[0]), point(c[3], c[2], n / counts[0]), "rgba(200, 215, 255, 0.45)", 0.8, []);
     }
     for (let n = 1; n < counts[1]; n++) {
-      line(mix(c[0], c[3], n / counts[1]), mix(c[1], c[2], n / counts[1]), "rgba(200, 215, 255, 0.45)", 0.8, []);
+      line(point(c[0], c[3], n / counts[1]), point(c[1], c[2], n / counts[1]), "rgba(200, 215, 255, 0.45)", 0.8, []);
     }
   }
 }

@@ -8,14 +8,6 @@ const views = [...document.querySelectorAll(".view")].map((box, law) => ({
 eye.around = -0.62;
 eye.above = 0.36;
 
-function mix(rows, where) {
-  const k = Math.min(Math.floor(where), rows.length - 1);
-  const a = rows[k];
-  const b = rows[Math.min(k + 1, rows.length - 1)];
-  const s = Math.min(where - k, 1);
-  return a.map((c, i) => (1 - s) * c + s * b[i]);
-}
-
 function paint(view, where) {
   const { pen, width, height } = cleared(view.canvas);
   const { right, up } = stance();
@@ -75,21 +67,9 @@ function paint(view, where) {
   const push = mix(view.path.push, where);
   const tip = plus(here, push, 0.35 * scene.size / scene.strongest);
   stroke([here, tip], css("--ink"), 1.6);
-  const [x1, y1] = flat(here);
-  const [x2, y2] = flat(tip);
-  const long = Math.hypot(x2 - x1, y2 - y1);
-  if (long > 6) {
-    const [ux, uy] = [(x2 - x1) / long, (y2 - y1) / long];
-    pen.beginPath();
-    pen.moveTo(x2 + 5 * ux, y2 + 5 * uy);
-    pen.lineTo(x2 - 4 * uy, y2 + 4 * ux);
-    pen.lineTo(x2 + 4 * uy, y2 - 4 * ux);
-    pen.closePath();
-    pen.fillStyle = css("--ink");
-    pen.fill();
-  }
+  arrowHead(pen, flat(here), flat(tip), css("--ink"), 5, 6);
   pen.beginPath();
-  pen.arc(x1, y1, 5, 0, 7);
+  pen.arc(...flat(here), 5, 0, 7);
   pen.fillStyle = view.colour;
   pen.fill();
   pen.strokeStyle = css("--card");

@@ -10,6 +10,30 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const plus = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
 
+// Interpolates between the rows of two frames.
+function mix(rows, where) {
+  const k = Math.min(Math.floor(where), rows.length - 1);
+  const next = rows[Math.min(k + 1, rows.length - 1)];
+  const s = Math.min(where - k, 1);
+  return rows[k].map((c, i) => (1 - s) * c + s * next[i]);
+}
+
+// Draws the head of an arrow between two points of the canvas, unless it is shorter than `least`; returns its direction.
+function arrowHead(pen, [x1, y1], [x2, y2], colour, ahead, least) {
+  const long = Math.hypot(x2 - x1, y2 - y1);
+  const [ux, uy] = long > 0 ? [(x2 - x1) / long, (y2 - y1) / long] : [0, 1];
+  if (long > least) {
+    pen.beginPath();
+    pen.moveTo(x2 + ahead * ux, y2 + ahead * uy);
+    pen.lineTo(x2 - 4 * uy, y2 + 4 * ux);
+    pen.lineTo(x2 + 4 * uy, y2 - 4 * ux);
+    pen.closePath();
+    pen.fillStyle = colour;
+    pen.fill();
+  }
+  return [ux, uy];
+}
+
 // The directions towards, right and up as seen by the reader.
 function stance() {
   const away = [Math.cos(eye.above) * Math.cos(eye.around), Math.cos(eye.above) * Math.sin(eye.around), Math.sin(eye.above)];

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from starhold.report.body import PageParts
 from starhold.report.figures import POINTS, Picture, over_time, without_runs
 from starhold.report.page_parts import PAGE_POINTS, over_time_data, rounded
-from starhold.report.plots import Curve, Plot, recorded_plots, thin_times, thinning
+from starhold.report.plots import Curve, Plot, longest, recorded_plots, thin_times, thinning
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -32,6 +32,6 @@ def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
 def collect(flights: Sequence[Flight], points: int) -> tuple[Curve, list[Plot]]:
     """Return times and a plot of each quantity that all flights record, with a panel per component, thinned to about
     `points` samples."""
-    longest = max((flight.recording["time"] for flight in flights), key=len)
-    factor = thinning(len(longest), points)
-    return thin_times(longest, factor), recorded_plots(flights, factor)
+    times = longest(flights)["time"]
+    factor = thinning(len(times), points)
+    return thin_times(times, factor), recorded_plots(flights, factor)

@@ -14,7 +14,7 @@ from starhold.report.figures import POINTS, Picture, headed, over_time, width_of
 from starhold.report.page_parts import PAGE_POINTS, over_time_data, rounded, views
 from starhold.report.path_plots import PathPlots, collect
 from starhold.report.plane_plots import GREY, draw_planes, plane_data
-from starhold.report.plots import colour, first_alone
+from starhold.report.plots import colour, first_alone, longest
 from starhold.report.tables import listed, titled
 
 if TYPE_CHECKING:
@@ -111,8 +111,8 @@ def _units(scenario: Scenario) -> list[tuple[str, str]]:
 
 
 def _scene(scenario: Scenario, flights: Sequence[Flight], plots: PathPlots) -> dict[str, Any]:
-    longest = max((flight.recording["time"] for flight in flights), key=len)
-    played = longest[longest <= TURNS * 2.0 * np.pi]
+    every = longest(flights)["time"]
+    played = every[every <= TURNS * 2.0 * np.pi]
     places = np.unique(np.rint(np.linspace(0.0, len(played) - 1, FRAMES + 1)).astype(int))
     units = scenario.table.libration.units
     paths: list[dict[str, Any]] = []
@@ -127,7 +127,7 @@ def _scene(scenario: Scenario, flights: Sequence[Flight], plots: PathPlots) -> d
                 "away": rounded(goal.distance(position) * units.length / 1e3, 3),
             }
         )
-    times = longest[places] if len(places) > 1 else np.array([0.0, 1.0])
+    times = every[places] if len(places) > 1 else np.array([0.0, 1.0])
     strongest = max(float(np.abs(flight.recording["control"]).max()) for flight in flights) or 1.0
     sound = [flight for flight in flights if flight.lost is None]
     farthest = max((float(np.abs(flight.recording["position"]).max()) for flight in sound), default=0.0)

@@ -29,7 +29,7 @@ from starhold.report.attitude_plots import (
 from starhold.report.body import PageParts, Sampling
 from starhold.report.figures import POINTS, Picture, over_time, without_runs
 from starhold.report.page_parts import PAGE_POINTS, over_time_data, panel_data, rounded, views
-from starhold.report.plots import Panel, Plot, thinning
+from starhold.report.plots import Panel, Plot, longest, thinning
 from starhold.report.tables import swatch
 from starhold.scenario.bodies.rigid_body.faults import fault_times
 from starhold.studies.flight import Begun, Flight
@@ -81,11 +81,10 @@ def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
     scene = _scene(scenario, flights)
     data = {"times": rounded(plots.times), "plots": [*_drawn(plots, flights, scenario), _accuracy(flights)]}
     data |= {"scene": scene, "unsure": plots.shaded, **_happenings(scenario, flights)}
-    longest = max(len(flight.recording["time"]) for flight in flights)
-    sampling = Sampling(thinning(longest, PAGE_POINTS))
+    sampling = Sampling(thinning(len(longest(flights)["time"]), PAGE_POINTS))
     if end is not None:
         early_flights = until(flights, end)
-        count = max(len(flight.recording["time"]) for flight in early_flights)
+        count = len(longest(early_flights)["time"])
         sampling = sampling._replace(early=(count, thinning(count, EARLY_POINTS)))
         first = collect(early_flights, EARLY_POINTS, scenario, end)
         drawn = {one["name"]: one for one in _drawn(first, flights, scenario)}
@@ -158,17 +157,17 @@ def _accuracy(flights: Sequence[Flight]) -> dict[str, Any]:
 
 
 def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
-    longest = max((flight.recording["time"] for flight in flights), key=len)
+    every = longest(flights)["time"]
     # Some frames of a short run would be equal; each sample shows once.
     end = early(flights)
-    power = EARLY if end is None else max(EARLY, math.log(end / float(longest[-1])) / math.log(0.5))
-    frames = np.rint((len(longest) - 1) * np.linspace(0.0, 1.0, FRAMES + 1) ** power).astype(int)
+    power = EARLY if end is None else max(EARLY, math.log(end / float(every[-1])) / math.log(0.5))
+    frames = np.rint((len(every) - 1) * np.linspace(0.0, 1.0, FRAMES + 1) ** power).astype(int)
     places = np.array(list(dict.fromkeys(frames.tolist())))
     attitudes: list[list[list[float | None]]] = []
     for flight in flights:
         q = flight.recording["attitude_error"]
         attitudes.append([rounded(q[place], 4) for place in places if place < len(q)] or [[1.0, 0.0, 0.0, 0.0]])
-    times = longest[places] if len(places) > 1 else np.array([0.0, 1.0])
+    times = every[places] if len(places) > 1 else np.array([0.0, 1.0])
     size, axes = _box(total_inertia(scenario.craft))
     return {
         "times": rounded(times),
@@ -186,7 +185,7 @@ def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
 
 def _earth(flights: Sequence[Flight], places: Any) -> list[list[float | None]]:
     """Return unit vectors, in target axes, to the centre of attraction at these samples of the longest run."""
-    run = max((flight.recording for flight in flights), key=lambda recording: len(recording["time"]))
+    run = longest(flights)
     attitude, error, position = (run[name][places].T for name in ("attitude", "attitude_error", "position"))
     goal = multiply(tuple(attitude), conjugate(tuple(error)))
     toward = to_body(goal, tuple(-position / np.linalg.norm(position, axis=0)))

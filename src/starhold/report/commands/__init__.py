@@ -59,13 +59,14 @@ class Cell(NamedTuple):
 
 class Table(NamedTuple):
     """Columns and rows. A cell is a number, several numbers, text, a `Cell`, or None if empty. bold: indices of highlighted
-    rows; ends: indices of rows followed by a line."""
+    rows; ends: indices of rows followed by a line; note: shown below it by the reports of campaigns."""
 
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]]
     title: str = ""
     bold: Collection[int] = ()
     ends: Collection[int] = ()
+    note: str = ""
 
     def heads(self) -> list[str]:
         """Return the headings, each with its unit."""

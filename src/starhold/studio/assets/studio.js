@@ -15,7 +15,7 @@ async function ask(path, body) {
   return { ok: answer.ok, ...(Array.isArray(found) ? { list: found } : found) };
 }
 
-// --- completion: keys of the table that the cursor is in, words of the key that it follows ---
+// --- completion: the keys of the table at the cursor, or the words allowed for the key before it ---
 
 function tableAt(line) {
   let name = "", type = null, first = 0;
@@ -86,7 +86,7 @@ function choose(text, buttons, field = null) {
   });
 }
 
-// --- the document: its name, the version of its file that was seen ("" for none), and the text as it was then ---
+// --- the document: its name, the version of its file when last read or saved ("" without a file), and its text then ---
 
 const doc = { name: "", version: "", saved: "" };
 const edited = () => Boolean(editor) && editor.getValue() !== doc.saved;
@@ -104,14 +104,14 @@ function named() {
   document.title = `${edited() ? "• " : ""}${doc.name} — starhold studio`;
 }
 
-// Whether what is edited may make room for another text: nothing that was typed goes unasked.
+// Whether another text may replace the edited one; asks the user if there are unsaved edits.
 async function room() {
   if (!edited()) return true;
   const how = await choose(`${doc.name} has edits that are not saved.`, { save: "Save them", drop: "Drop them", "": "Stay here" });
   return how === "drop" || (how === "save" && save());
 }
 
-// Answers whether the text was written.
+// Returns whether the text was saved.
 async function save() {
   let { name, version } = doc;
   for (let again = !version; ; again = true) {
@@ -151,7 +151,7 @@ function soon() {
   checking = setTimeout(check, 300);
 }
 
-// What is told of the text that stands there; one check at a time.
+// Checks the text in the editor; one check runs at a time.
 async function check() {
   clearTimeout(checking);
   while (busy) await busy;
@@ -198,7 +198,7 @@ function tell(found) {
 const boxes = new Map();
 
 async function begin(kind) {
-  // What is wrong is said here, where it can be seen; the server would refuse it likewise.
+  // A text with errors is not sent: the editor shows them, while the server would only refuse the job.
   if (!(await check()).name) return;
   started(await ask("/jobs", { kind, text: editor.getValue() }), doc.name);
 }
@@ -238,7 +238,7 @@ function place(job, name = "") {
   boxes.set(job.number, box);
 }
 
-// One result has the whole place, unless all are to stand beside each other.
+// Brings one result to the front; side by side, all are visible.
 function front(box) {
   for (const one of document.querySelectorAll(".result.front, #tabs .front")) one.classList.remove("front");
   box.classList.add("front");
@@ -272,7 +272,7 @@ function update(job) {
   shown.addEventListener("load", () => { if (shown.contentWindow && shown.contentWindow.fileText) box.querySelector("div").insertBefore(taker(shown, box), apart); });
 }
 
-// What a report's sliders say, as the scenario that is edited.
+// Makes a button that copies the scenario set by a report's sliders into the editor.
 function taker(frame, box) {
   const button = document.createElement("button");
   button.textContent = "To the editor";
@@ -280,7 +280,7 @@ function taker(frame, box) {
   button.addEventListener("click", async () => {
     const text = frame.contentWindow.fileText(), own = box.dataset.document === doc.name;
     if (!(await room())) return;
-    // Of the document that it was flown from it is an edit, which can be undone.
+    // In the document that was flown this is an edit, which can be undone.
     if (own) editor.setValue(text);
     else {
       show(box.dataset.document || "flown.toml", "", text);
@@ -291,7 +291,7 @@ function taker(frame, box) {
   return button;
 }
 
-// One run of a campaign again.
+// Makes a form that flies one run of a campaign again.
 function again(job) {
   const form = document.createElement("form");
   form.innerHTML = `<select aria-label="law">${job.laws.map((law) => `<option>${plain(law)}</option>`).join("")}</select>`

@@ -1,6 +1,5 @@
 """The cost of a law's calls along a flight, in processor time and operations."""
 
-import time
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -56,19 +55,13 @@ def call_times(desk: Desk) -> dict[str, NDArray[np.float64]]:
         for _ in range(PASSES):
             for name, kernel in kernels.items():
                 chunk = TIMED[name].chunk
-                empty[name] = min([empty[name], *(_timed(kernel, 0, 0) for _ in range(20))])
+                empty[name] = min([empty[name], *(kernel.timed(0, 0) for _ in range(20))])
                 for number in range(len(times[name])):
-                    times[name][number] = min(times[name][number], _timed(kernel, number * chunk, (number + 1) * chunk))
+                    times[name][number] = min(times[name][number], kernel.timed(number * chunk, (number + 1) * chunk))
         # Both are least before one is taken from the other: an empty call in a slow moment would make a call too short.
         return {name: np.maximum(spent - empty[name], 1e-9) / TIMED[name].chunk for name, spent in times.items()}
 
     return desk.once(("call times",), make)
-
-
-def _timed(kernel: Replay, first: int, last: int) -> float:
-    begun = time.thread_time()
-    kernel(first, last)
-    return time.thread_time() - begun
 
 
 def mean_time(desk: Desk, name: str) -> float:
@@ -76,9 +69,9 @@ def mean_time(desk: Desk, name: str) -> float:
     return float(call_times(desk)[name][: WINDOW // TIMED[name].chunk].mean())
 
 
-def ratio(desk: Desk, name: str, to: str = "lyapunov") -> float:
-    """The mean duration of a call divided by that of another law."""
-    return mean_time(desk, name) / mean_time(desk, to)
+def ratio(desk: Desk, name: str) -> float:
+    """The mean duration of a call divided by that of the Lyapunov law."""
+    return mean_time(desk, name) / mean_time(desk, "lyapunov")
 
 
 def total_time(desk: Desk, name: str) -> Finding:

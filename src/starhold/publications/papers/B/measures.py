@@ -62,7 +62,7 @@ def smooth(desk: Desk) -> Finding:
     return Finding(steps["lyapunov"] < 0.02 * steps["sliding"], "largest change per call: " + _listed(steps, "N m"))
 
 
-def alternates(desk: Desk, of: Mapping[str, Sequence[str]], quantity: str, least: float = 0.95) -> Finding:
+def alternates(desk: Desk, of: Mapping[str, Sequence[str]], quantity: str) -> Finding:
     """Return whether every component of the torque, or of the increments of the rate, changes sign at nearly every call in
     the last 150 s. of: file and law by the names of cases."""
     shares: dict[str, float] = {}
@@ -71,7 +71,7 @@ def alternates(desk: Desk, of: Mapping[str, Sequence[str]], quantity: str, least
         values = np.asarray(run[quantity])[-1500:]
         signs = np.sign(np.diff(values, axis=0) if quantity == "rate" else values)
         shares[name] = float((np.diff(signs, axis=0) != 0).mean(axis=0).min())
-    return Finding({name: share >= least for name, share in shares.items()}, "share of calls: " + _listed(shares))
+    return Finding({name: share >= 0.95 for name, share in shares.items()}, "share of calls: " + _listed(shares))
 
 
 def worse_with_noise(desk: Desk) -> Finding:

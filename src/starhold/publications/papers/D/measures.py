@@ -351,8 +351,8 @@ def _left(inertia: NDArray[np.float64], torque: NDArray[np.float64], a: float) -
     return 2.0 * math.asin(float(np.linalg.norm(np.linalg.solve(inertia, torque))) / (2.0 * a * a))
 
 
-def _root(scenario: Any, law: str = "modal") -> float:
-    return float(scenario.pick(law).gains.phi_0[0])
+def _root(scenario: Any) -> float:
+    return float(scenario.pick("modal").gains.phi_0[0])
 
 
 def _limits(desk: Desk) -> Limits:

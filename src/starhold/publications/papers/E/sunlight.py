@@ -22,9 +22,9 @@ TURN = np.linspace(0.0, 2.0 * np.pi, 181)
 RING = np.array([np.cos(TURN), np.sin(TURN)])
 
 
-def station(specular: float = 1.0) -> Station:
-    """Return the circle with a radius of one Earth diameter around L2, with a sail."""
-    return Station(PAIR, "L2", EARTH_DIAMETER, specular)
+def station() -> Station:
+    """Return the circle with a radius of one Earth diameter around L2, with a perfect mirror as the sail."""
+    return Station(PAIR, "L2", EARTH_DIAMETER, 1.0)
 
 
 def discs() -> tuple[float, float]:

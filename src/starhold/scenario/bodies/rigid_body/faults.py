@@ -128,7 +128,8 @@ def _told(gains: Any, wheels: Wheels, fault: FaultTable) -> Any:
 
 
 def _left(scenario: Scenario, wheels: Wheels, place: int, fault: FaultTable, gains: Any) -> Wheels:
-    """Return the wheels, reallocated after a diagnosed fault; unchanged where too few remain but another mode begins."""
+    """Return the wheels with the torque allocated to those that remain after a diagnosed fault; unchanged if too few remain
+    and another mode takes over."""
     try:
         return lose(wheels, _index(fault)) if wheels.torque_limit[_index(fault)] == 0.0 else wheels
     except ValueError as error:
