@@ -18,8 +18,8 @@ from starhold.certification.unmodelled import Pushes
 from starhold.kernel.theorems.pointing import on_level
 from starhold.parts.contract import Late
 from tests.kernel.certificates import failing
+from tests.kernel.lagging import flying
 from tests.kernel.oracle import Oracle, number
-from tests.kernel.test_late import flying
 from tests.making import built
 
 MOMENT, K_RATE, K_ATTITUDE, PERIOD, ERROR = 2.0, 0.09, 0.009, 0.1, 1e-6

@@ -44,7 +44,7 @@ class Blended(Held):
     @cached_property
     def split(self) -> list[tuple[Fraction, Part]]:
         """Return the shares and the parts of V, by how many rates a term has as factors."""
-        of, found = dict[int, dict[Monomial, Fraction]](), list[tuple[Fraction, Part]]()
+        of, shared = dict[int, dict[Monomial, Fraction]](), list[tuple[Fraction, Part]]()
         for m, c in sorted(self.loop.lyapunov.terms.items()):
             of.setdefault(sum(name[0] == "w" for name in m), {})[m] = c
         for terms in of.values():
@@ -53,8 +53,8 @@ class Blended(Held):
             key = (*unit.items(),)
             if key not in self.known:
                 self.known[key] = Part(self, Poly(unit))
-            found.append((share, self.known[key]))
-        return found
+            shared.append((share, self.known[key]))
+        return shared
 
     def further(self, rates: list[Poly]) -> Poly:
         """Return the derivative of V' that follows some others, V' being the first."""
