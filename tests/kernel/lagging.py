@@ -11,6 +11,7 @@ from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.evidence.terms import valued
+from starhold.certification.proofs import pointed
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes
 from starhold.kernel.follower import FIRST, REST
@@ -19,6 +20,7 @@ from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import apply, cross, dot
 from starhold.kernel.regions import TURN
+from starhold.parts.catalogue import fit
 from tests.kernel.flights import along, rates, stepped
 from tests.making import built
 
@@ -31,6 +33,16 @@ def plain():
     """A loop without actuators."""
     loop = Loop(make_subject(built("three-laws", "lyapunov")))
     return loop, Pushed(loop, Pushes(0.0))
+
+
+@cache
+def flying(part, *numbers):
+    """A loop with an actuator, and its pointing claim."""
+    loop = built("three-laws", "lyapunov").with_parts(fit("actuator", part, *numbers))
+    # In steps that follow it almost exactly.
+    loop = replace(loop, substeps=40)
+    claim, why = pointed(make_subject(loop))
+    return loop, claim, why
 
 
 class Lagging:

@@ -168,9 +168,9 @@ CASES = {
         sliding(0.1), theorem=REACHES, s=surface(0.1), taken=["outside torque"], outside_0=0.2, outside_1=0.0, outside_2=0.0
     ),
 }  # fmt: skip
-"""Two more are below, and others in the tests of false flights, pointing, noise, plans, appendages and stations. For one no
-false claim is its own: the kernel itself compares V at the other equilibrium with the level, to choose between two proofs,
-and the other one fails for two wells. Without a level that equilibrium is never stable."""
+"""Two more are below, and others in the tests of false flights, pointing, what is late, noise, plans, appendages and
+stations. For one no false claim is its own: the kernel itself compares V at the other equilibrium with the level, to choose
+between two proofs, and the other one fails for two wells. Without a level that equilibrium is never stable."""
 
 
 @pytest.mark.parametrize("hypothesis", CASES)

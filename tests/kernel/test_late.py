@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,22 +30,13 @@ from starhold.simulation.lane import fly, label
 from starhold.studies.compare import record
 from tests.certification.attack import Attack, flown
 from tests.kernel.flights import Around, along
+from tests.kernel.lagging import flying
 from tests.making import built
 from tests.parts.files import BODY, FILES, PD, part
 from tests.tiers import leading
 
 INERTIA = np.array([2.0, 3.0, 4.0])
 LATE = [(("lag", 0.05),), (("rate-limit", 0.1),), (("lag", 0.5),)]
-
-
-@cache
-def flying(part, *numbers):
-    """A loop with an actuator, and its pointing claim."""
-    loop = built("three-laws", "lyapunov").with_parts(fit("actuator", part, *numbers))
-    # In steps that follow it almost exactly.
-    loop = replace(loop, substeps=40)
-    claim, why = pointed(make_subject(loop))
-    return loop, claim, why
 
 
 def edited(claim, part="numbers", **changes):

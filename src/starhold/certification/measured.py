@@ -230,33 +230,34 @@ def strayed(recursion: Recursion) -> Array | None:
     """Return how far off the attitude is told at most at each later step (lags,), for each unit by which the body turns in a
     period otherwise than at the mean of two readings; None for an estimate that is propagated otherwise, or does not forget.
     """
-    sizes = _sizes(recursion)[1] if recursion.strays else []
+    sizes = _sizes(recursion, False)[1] if recursion.strays else []
     return np.max([one[0, -1] for one in sizes], axis=0) if sizes else None
 
 
-def _sizes(recursion: Recursion) -> tuple[float, list[Array]]:
+def _sizes(recursion: Recursion, read: bool = True) -> tuple[float, list[Array]]:
     """Return the share of an error that is left after a cycle, in the end, and the result of `_sums` for each step of a
     cycle, nothing for an estimate that does not forget."""
     steps: list[list[list[float]]] = [_matrix(step, recursion).tolist() for step in (recursion.carried, recursion.corrected)]
     rows = tuple(tuple(tuple(row) for row in step) for step in steps)
-    return _sizes_of(recursion.every, 3 * recursion.size, rows)
+    return _sizes_of(recursion.every, 3 * recursion.size, rows, read)
 
 
 @cache
-def _sizes_of(every: int, size: int, matrices: tuple[Any, ...]) -> tuple[float, list[Array]]:
+def _sizes_of(every: int, size: int, matrices: tuple[Any, ...], read: bool) -> tuple[float, list[Array]]:
     carried, corrected = np.array(matrices[0]), np.array(matrices[1])
     steps = [*[carried] * (every - 1), corrected]
     motions = [step[:size, :size] for step in steps]
     radius = float(np.abs(np.linalg.eigvals(reduce(lambda one, A: A @ one, motions, np.eye(size)))).max())
     if radius >= 1.0 or (count := ceil(log(SMALL) / log(max(radius, SMALL)))) > MOST:
         return radius, []
-    return radius, [_sums(steps, phase, count, size) for phase in range(every)]
+    return radius, [_sums(steps, phase, count, size, read) for phase in range(every)]
 
 
-def _sums(steps: list[Array], phase: int, count: int, size: int) -> Array:
+def _sums(steps: list[Array], phase: int, count: int, size: int, read: bool) -> Array:
     """Return the sizes of the errors of attitude and rate, at a step of a cycle, due to each reading, and to a turn that the
-    estimate leaves out, from 0 to so many cycles of steps before: (2, readings + 1, lags)."""
-    every, readings = len(steps), steps[0].shape[1] // 3 - size // 3 - 1
+    estimate leaves out, from 0 to so many cycles of steps before: (2, readings + 1, lags); not `read`: to such a turn alone,
+    (2, 1, lags)."""
+    every, readings = len(steps), (steps[0].shape[1] // 3 - size // 3 - 1) * read
     order = [steps[(phase + k) % every][:size, :size] for k in range(every)]
     motion, amiss = reduce(lambda one, A: A @ one, order, np.eye(size)), steps[phase][size:, :size]
     powers = np.array([amiss])
@@ -265,7 +266,7 @@ def _sums(steps: list[Array], phase: int, count: int, size: int) -> Array:
     sizes = np.zeros((2, readings + 1, every * (len(powers) + 1)))
     # The gyro's, without its walk, and the attitudes', which are new at the last step of a cycle; a turn that is left out is
     # like one by which the attitude, the first of the errors, is off as the step begins.
-    places = [0, *range(2, readings + 1), -size // 3]
+    places = [*([0, *range(2, readings + 1)] if read else ()), -size // 3]
     since = np.eye(size)
     for lag in range(every + 1):
         at = (phase - lag) % every

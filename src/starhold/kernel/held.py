@@ -116,7 +116,7 @@ class Held(Follower):
         self.bend = apply(self.N, self.gyroscopic)
         self.bent = [[p.slope(name) for name in STATE[RATE]] for p in self.bend]
         self.rate = loop.slopes_along(V, self.accelerated)
-        commanded_rates = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
+        self.commanded = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
         # The law's torque minus its linear part near the target.
         on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
         self.heeded = [with_momentum(p) for p in loop.u]
@@ -131,7 +131,7 @@ class Held(Follower):
         self.speeding = [(p - g - rate).at(on) for p, g, rate in zip(self.pull, self.bend, rates, strict=True)]
         parts = zip(self.u, self.more, linear, self.gyroscopic, self.turning, strict=True)
         self.left = [(p + more - near - g - turning).at(on) for p, more, near, g, turning in parts]
-        steep = [self.rate.slope(name).at(commanded_rates).at(on) for name in STATE[RATE]]
+        steep = [self.rate.slope(name).at(self.commanded).at(on) for name in STATE[RATE]]
         bent = ("q0", *STATE, *MOMENTA)
         self.curvature = {name: [self.rate.slope(name).slope(other) for other in bent] for name in STATE[RATE]}
         at = dict.fromkeys((*STATE, "v", *self.others), 0)
@@ -162,17 +162,25 @@ class Held(Follower):
     def motion(self) -> tuple[Factored, Poly, Fraction]:
         """Return the mean of -V' over a period without disturbances, up to a derivative of V', then that derivative, and its
         share in the mean: the law's torque is held, and wheels' momentum turns against the body."""
-        loop, rates, share = self.loop, [self.rate], Fraction(1)
-        carried = dict(zip(MOMENTA, cross(loop.H, loop.w), strict=True)) if loop.wheels else {}
-        mean = self.rate
+        rates, shares = [self.rate], [Fraction(1)]
         while len(rates) < ORDER and len(rates[-1].terms) < LONG:
-            p = rates[-1]
-            more = total(p.slope(name) * x for name, x in carried.items())
-            rates.append(loop.slopes_along(p, self.accelerated) + more)
-            share *= self.h / (len(rates))
-            mean += share * rates[-1]
-        commanded = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
-        return factored(-mean.at(commanded)), rates[-1], share * self.h / (len(rates) + 1)
+            rates.append(self.further(rates))
+            shares.append(shares[-1] * self.h / len(rates))
+        return factored(-self.by_law(rates, shares)), rates[-1], shares[-1] * self.h / (len(rates) + 1)
+
+    def along(self, p: Poly) -> Poly:
+        """Return the derivative of an expression of the state and of wheels' momentum in a period."""
+        loop = self.loop
+        carried = dict(zip(MOMENTA, cross(loop.H, loop.w), strict=True)) if loop.wheels else {}
+        return loop.slopes_along(p, self.accelerated) + total(p.slope(name) * x for name, x in carried.items())
+
+    def further(self, rates: list[Poly]) -> Poly:
+        """Return the derivative of V' that follows some others, V' being the first."""
+        return self.along(rates[-1])
+
+    def by_law(self, rates: list[Poly], shares: list[Fraction]) -> Poly:
+        """Return the sum of shares of V' and its derivatives, with the law's torque."""
+        return dot(shares, rates).at(self.commanded)
 
     def form(self, c: Fraction) -> Rows:
         """Return the matrix of x.Gx + c |q|^2."""

@@ -21,7 +21,7 @@ from starhold.certification.evidence.squares import rounded
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
 from starhold.kernel.numbers import RefusedError, plus, times, transpose
-from starhold.kernel.regions import STATE, Tube, balls
+from starhold.kernel.regions import STATE, Tube, balls, factored, least_form
 from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
 from starhold.kernel.theorems.response import Response, first_of, responds
 
@@ -30,8 +30,9 @@ linalg: Any = import_module("scipy.linalg")
 FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 4.0, 40, 24
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
 the largest ratio of successive levels; the most levels and ellipsoids."""
-SMALLER = 4
-"""The ratio of the levels that tell how disturbances weigh in sets of different size."""
+SMALLER, FAR = 4, 0.05
+"""The ratio of the levels that tell how disturbances weigh in sets of different size; and by how much a form, in units of
+its diagonal, has to be indefinite not to count as a near miss."""
 LOWER, SHORTEST, WORTH, ALIKE = 0.9, 0.12, 1.003, 1.005
 """The share of a level that the next one is at most; the least share of the largest ratio, in powers; up to which multiple
 of the last bound no further response is worth its time, and up to which multiple of another a bound counts as no wider."""
@@ -95,8 +96,22 @@ class Chain:
 
     def decreases(self, noticeably: bool = True) -> bool:
         """Return whether V decreases on the whole set, down to a noticeably lower level, or to any lower one."""
+        if self.rises():
+            return False
         lower = self.lower(Fraction(self.level))
         return lower is not None and float(lower[2]) * (FLOOR / LOWER if noticeably else 1.0) < self.level
+
+    def rises(self) -> bool:
+        """Return whether V is far from decreasing on the whole set even with a torque that is not held, which takes a
+        fraction of the time to tell."""
+        motion = self.motion
+        try:
+            slope = factored(-motion.by_law([motion.rate], [Fraction(1)]))
+            form = floats(least_form(slope, motion.region(Fraction(self.level))))
+        except RefusedError:
+            return True
+        scale = np.sqrt(np.maximum(np.diag(form), 1e-300))
+        return float(np.linalg.eigvalsh(form / np.outer(scale, scale))[0]) < -FAR
 
     def wants_more(self) -> bool:
         """Return whether larger sets may do where V does not decrease to a lower level on this one: relative to the level,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.blends import Blended, Parts
 from starhold.certification.evidence.chains import Chain, Falls
 from starhold.certification.evidence.ellipsoids import MORE
 from starhold.certification.evidence.finding import read
@@ -133,7 +134,7 @@ class Pushed:
         self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
         slow = sqrt(self.stiffness / float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1]))
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
-        self.known = dict[Shape, Lean]()
+        self.known, self.parts = dict[Shape, Lean](), Parts()
         self.usual = [Shape(float(f"{lean * slow:.4g}")) for lean in LEANS]
 
     @cached_property
@@ -148,7 +149,7 @@ class Pushed:
             s = None if self.even else self.stiffness
             V = self.loop.crossed(s, shape.epsilon) if shape in self.usual else self.loop.softened(s, shape)
             wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
-            motion = Held(wired, self.plan)
+            motion = Blended(wired, self.plan, self.parts)
             self.plan = motion.plan
             if self.radii:
                 motion.sways(self.radii)

@@ -169,6 +169,7 @@ def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly
     columns = [*problem.columns, *more]
     rows = {m: k for k, m in enumerate(sorted({m for q in (problem.p, *columns) for m in q.terms}))}
 
+    @cache
     def size(m: Monomial) -> float:
         return float(np.prod([scales.get(name, 1.0) for name in m]))
 
