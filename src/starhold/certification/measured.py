@@ -138,7 +138,7 @@ def measured(loop: ClosedLoop) -> Measured | None:
     recursion: Recursion | None = tell(given[0], noise, *given[1:])
     if recursion is None:
         return None
-    amiss = _estimated(recursion, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
+    amiss = estimated(recursion, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
     return None if amiss is None else Measured(amiss, recursion, (*sensors, *estimators), random, wider, gaussian)
 
 
@@ -175,7 +175,7 @@ def tells_place(fitted: Fitted) -> bool:
     return not PLACED.isdisjoint((module.Reading if fitted.part.role == "sensor" else module.Estimate)._fields)
 
 
-def _estimated(
+def estimated(
     recursion: Recursion, tell: Any, given: Any, noise: Noise, rates: list[Any], attitudes: list[Any]
 ) -> Told | None:
     """Return the errors of an estimate with errors of its readings besides noise; None where it does not forget them."""

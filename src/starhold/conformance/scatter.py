@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import conjugate, multiply, vector_part
 from starhold.algebra.vector import ZERO, Vector, add, norm, scale, subtract, unit
 from starhold.certification.measured import bounded
 from starhold.conformance.bench import loop_with
-from starhold.conformance.directions import sky_at
+from starhold.conformance.directions import scattered, sky_at, turn_between
 from starhold.conformance.verdicts import NotApplicableError, require
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS, Direction, Noise, Place
@@ -38,8 +37,9 @@ class Scatter(NamedTuple):
 
 
 def draws_as_it_says(part: Part) -> None:
-    """Random errors are no larger than its `noise` or `direction` says, and independent; a place is within its `place`."""
-    if not any(map(part.hook, ("noise", "direction", "place"))):
+    """Random errors are no larger than its `noise`, `direction` or `combined` says, and new each time; a place is within its
+    `place`."""
+    if not any(map(part.hook, ("noise", "direction", "place", "combined"))):
         raise NotApplicableError("it says nothing of random errors")
     for params in part.examples():
         loop = loop_with(part, params)
@@ -54,6 +54,8 @@ def draws_as_it_says(part: Part) -> None:
                 )
         if part.hook("place"):
             _places(fitted, loop)
+        for size, most in scattered(fitted, loop) if part.hook("combined") else ():
+            require(size <= MORE * most, f"random part of the attitude has a deviation of {size:g}, that said {most:g}")
 
 
 def _scatters(fitted: Fitted, loop: ClosedLoop) -> Iterator[Scatter]:
@@ -109,8 +111,7 @@ def _sums(fitted: Fitted, loop: ClosedLoop, name: str, every: int) -> Array:
 def _apart(name: str, quiet: Any, seen: Any) -> Vector:
     """Return by how much a reading differs from another one, as a rotation (rad) if it is an attitude."""
     if name == "attitude":
-        turned = multiply(conjugate(quiet), seen)
-        return scale(2.0 if turned[0] >= 0.0 else -2.0, vector_part(turned))
+        return turn_between(quiet, seen)
     return subtract(seen, quiet) if name == "rate" else subtract(unit(seen), unit(quiet))
 
 
