@@ -184,6 +184,14 @@ BROKEN = {
         },
         {"keeps_what_it_says"},
     ),
+    "a field that is farther off than it says": (
+        "magnetometer", {"scaled + math.hypot(*params.bias)": "scaled"}, {"keeps_what_it_says"}
+    ),
+    "a field with more noise than it says": (
+        "magnetometer",
+        {"bias=(2e-7, -1e-7, 3e-7), scale_error=0.002": "bias=ZERO", "field=_deviation": "field=0.4 * _deviation"},
+        {"draws_as_it_says"},
+    ),
     "directions that scatter the attitude more than it says": (
         "triad", {"error, math.sqrt((total": "error, 0.2 * math.sqrt((total"}, {"draws_as_it_says"}
     ),

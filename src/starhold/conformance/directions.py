@@ -90,13 +90,13 @@ def scattered(fitted: Fitted, loop: ClosedLoop) -> Iterator[tuple[float, float]]
 
     def sizes(place: int, count: int) -> list[float]:
         random, drawn = np.random.default_rng([2, place]), np.random.default_rng([3, place])
-        places, found = random.bit_generator.state, list[float]()
+        places, lengths = random.bit_generator.state, list[float]()
         for _ in range(count):
             # The same place and attitude again.
             random.bit_generator.state = places
             off = estimated_amid(fitted, loop, random, lambda kind, _: scale(OFF[kind] / 20.0, _drawn(drawn)))
-            found.append(0.0 if off is None else norm(off))
-        return found
+            lengths.append(0.0 if off is None else norm(off))
+        return lengths
 
     worst = sorted(range(4 * STEPS), key=lambda place: -max(sizes(place, 2)))[:5]
     most = float(np.linalg.norm(np.array(given[1].attitude), 2))
@@ -140,9 +140,14 @@ def inertial_directions(params: Any, position: Vector, time: float) -> dict[str,
     """Return the unit vectors of Sun, field and nadir at a position (m) and a time (s), in inertial axes, and the field's
     strength (T)."""
     epoch = getattr(params, "epoch", START)
-    field = magnetic_field.field(position, time, magnetic_field.prepared(epoch))
+    field = field_at(params, position, time)
     toward = sun.sun(time, sun.prepared(epoch, getattr(params, "ephemeris", 0))).direction
     return {"sun": toward, "field": unit(field), "nadir": unit(scale(-1.0, position)), "strength": norm(field)}
+
+
+def field_at(params: Any, position: Vector, time: float) -> Vector:
+    """Return the magnetic field (T, inertial axes) at a position (m) and a time (s)."""
+    return magnetic_field.field(position, time, magnetic_field.prepared(getattr(params, "epoch", START)))
 
 
 def _drawn(random: np.random.Generator) -> Vector:

@@ -60,8 +60,8 @@ def _follows(fitted: Fitted, recursion: Recursion, tell: Any, noise: Noise) -> N
     made = [np.subtract(a, b) for a, b in zip(noisy, quiet, strict=True)]
     # A step of the bias between two readings counts with the one before or the one after.
     apart = [
-        [float(np.abs(a - b)[STEPS // 2 :].max()) for a, b in zip(made, told, strict=True)]
-        for told in (_told(recursion, drawn, shift) for shift in (0, 1))
+        [float(np.abs(a - b)[STEPS // 2 :].max()) for a, b in zip(made, expected, strict=True)]
+        for expected in (_expected(recursion, drawn, shift) for shift in (0, 1))
     ]
     for k, name in enumerate(("attitude", "rate")):
         size = float(np.abs(made[k][STEPS // 2 :]).max())
@@ -79,18 +79,18 @@ def _follows(fitted: Fitted, recursion: Recursion, tell: Any, noise: Noise) -> N
             )
 
 
-def _told(recursion: Recursion, drawn: Array, shift: int) -> tuple[Array, Array]:
+def _expected(recursion: Recursion, drawn: Array, shift: int) -> tuple[Array, Array]:
     """Return the errors of attitude and rate at each step that the recursion gives, with walks of so many steps before."""
-    errors, told = (ZERO,) * recursion.size, list[tuple[Vector, Vector]]()
+    errors, amiss = (ZERO,) * recursion.size, list[tuple[Vector, Vector]]()
     walks = np.roll(drawn[:, 1], shift, axis=0)
     for step, (random, walk) in enumerate(zip(drawn, walks, strict=True)):
         move = recursion.carried if step % recursion.every else recursion.corrected
         vectors = [unflatten(x, ZERO) for x in random]
         vectors[1] = unflatten(walk, ZERO)
-        errors, *amiss = move(errors, tuple(vectors))
-        told.append((amiss[0], amiss[1]))
-    attitude, rate = zip(*told, strict=True)
-    return np.array(attitude), np.array(rate)
+        errors, attitude, rate = move(errors, tuple(vectors))
+        amiss.append((attitude, rate))
+    attitudes, rates = zip(*amiss, strict=True)
+    return np.array(attitudes), np.array(rates)
 
 
 def _flight(fitted: Fitted, noise: Noise, more: int) -> Callable[[Array, Vector], tuple[Array, Array]]:
@@ -127,9 +127,9 @@ def _flight(fitted: Fitted, noise: Noise, more: int) -> Callable[[Array, Vector]
             first, walk, *turns = (unflatten(x, ZERO) for x in random)
             roots = (noise.attitude, *noise.more)
             off = [unflatten(np.array(root) @ turn, ZERO) for root, turn in zip(roots, turns, strict=True)]
-            told, memory = estimate(memory, attitude, rate, (add(scale(noise.rate, first), bias), *off), settled + step)
+            after, memory = estimate(memory, attitude, rate, (add(scale(noise.rate, first), bias), *off), settled + step)
             bias = add(bias, scale(noise.walk, walk))
-            amiss.append((turn_between(attitude, told.attitude), subtract(told.rate, rate)))
+            amiss.append((turn_between(attitude, after.attitude), subtract(after.rate, rate)))
         attitudes, rates = zip(*amiss, strict=True)
         return np.array(attitudes), np.array(rates)
 

@@ -9,12 +9,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from starhold.algebra.quaternion import conjugate, multiply, normalise, vector_part
+from starhold.algebra.quaternion import conjugate, multiply, normalise, to_body, vector_part
 from starhold.algebra.vector import ZERO, Vector, add, norm, scale, subtract
 from starhold.certification.measured import bounded
 from starhold.certification.unmodelled import COMMANDED, envelope_of
 from starhold.conformance.bench import PERIOD, Jumping, anywhere, loop_with, momentum_of, moving
-from starhold.conformance.directions import misdirected, tells
+from starhold.conformance.directions import field_at, misdirected, tells
 from starhold.conformance.motions import moves_as_it_says, pulls_as_it_says
 from starhold.conformance.verdicts import STEPS, NotApplicableError, require
 from starhold.loop.closed_loop import ClosedLoop
@@ -37,12 +37,12 @@ def keeps_what_it_says(part: Part) -> None:
         moves_as_it_says(part)
         return
     tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
-    told = tells(part) or tell_torque or tell_errors or tell_change
+    bounds = tells(part) or tell_torque or tell_errors or tell_change
     if part.hook("perturbation") is not None:
         pulls_as_it_says(part)
-        if not told:
+        if not bounds:
             return
-    if not told:
+    if not bounds:
         raise NotApplicableError("it says no bound of its torque, of its errors or of its motion")
     for params in part.examples():
         loop = loop_with(part, params)
@@ -133,6 +133,9 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
                 # The angle, for either sign of the quaternion.
                 turn = 2.0 * norm(vector_part(multiply(conjugate(state.attitude), reading.attitude)))
                 yield "error of the attitude", turn, errors.attitude + errors.turning * fast
+            if hasattr(reading, "magnetic_field") and getattr(reading, "magnetic_field_is_new", 1.0) > 0.5:
+                true = to_body(state.attitude, field_at(fitted.params, state.position, step * loop.period))
+                yield "error of the field", norm(subtract(reading.magnetic_field, true)), errors.field
             if hasattr(reading, "rate"):
                 off = subtract(reading.rate, state.rate)
                 begun, grown = off if step == 0 else begun, errors.turned * fast + errors.late * hurried
