@@ -192,6 +192,18 @@ BROKEN = {
         {"bias=(2e-7, -1e-7, 3e-7), scale_error=0.002": "bias=ZERO", "field=_deviation": "field=0.4 * _deviation"},
         {"draws_as_it_says"},
     ),
+    "a torque that grows in a flight": (
+        "residual-dipole",
+        {
+            "return magnetic_field.field_at(": "return scale(1.0 + 1e-6 * step, magnetic_field.field_at(",
+            "step, params.field)": "step, params.field))",
+            "import ZERO, Vector, ": "import ZERO, Vector, scale, ",
+        },
+        {"keeps_what_it_says"},
+    ),
+    "a torque that is not across the field": (
+        "residual-dipole", {"to_body(state.attitude, memory))": "memory)"}, {"keeps_what_it_says"}
+    ),
     "directions that scatter the attitude more than it says": (
         "triad", {"error, math.sqrt((total": "error, 0.2 * math.sqrt((total"}, {"draws_as_it_says"}
     ),

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from starhold.algebra.quaternion import conjugate, multiply, normalise, to_body, vector_part
-from starhold.algebra.vector import ZERO, Vector, add, norm, scale, subtract
+from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, subtract, unit
 from starhold.certification.measured import bounded
 from starhold.certification.unmodelled import COMMANDED, envelope_of
 from starhold.conformance.bench import PERIOD, Jumping, anywhere, loop_with, momentum_of, moving
@@ -23,6 +23,9 @@ from starhold.parts.orbit import at_anomaly
 from starhold.parts.part import Fitted, Part
 from starhold.parts.random import Dice
 from starhold.simulation.lane import fly
+
+LATER = 720720
+"""So many control steps are a multiple of all numbers of up to 16."""
 
 
 def keeps_what_it_says(part: Part) -> None:
@@ -120,13 +123,19 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
 
     memory = fitted.remembered(numbers, *([loop.start] if part.role in ("sensor", "estimator") else []))
     states, begun = (moving if errors.grow else anywhere)(loop, random), ZERO
-    for step, (state, fast, hurried) in enumerate(islice(states, STEPS)):
+    for count, (state, fast, hurried) in enumerate(islice(states, STEPS)):
+        # Now and then much later, at a step of the same phase of all that comes every few.
+        step = count + LATER * (count // 8)
         if part.role == "environment":
             # On all of the orbit.
             place, speed = at_anomaly(state.position, state.velocity, loop.craft.gravity, 2.0 * pi * random.uniform())
             state = state._replace(position=place, velocity=speed) if loop.has("two-body") else state
             memory = module.update(memory, state, numbers, dice, step) if part.hook("update") else memory
-            yield "torque", norm(module.torque(state, numbers, loop.craft, memory)), most(torque, state)
+            acting = module.torque(state, numbers, loop.craft, memory)
+            yield "torque", norm(acting), most(torque, state)
+            if part.flag("ACROSS_FIELD"):
+                along = unit(to_body(state.attitude, field_at(fitted.params, state.position, step * loop.period)))
+                yield "part of the torque along the field", abs(dot(acting, along)), 1e-3 * torque.torque
         elif part.role == "sensor":
             reading, memory = module.measure(state, memory, numbers, dice, step)
             if hasattr(reading, "attitude"):
@@ -138,7 +147,7 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
                 yield "error of the field", norm(subtract(reading.magnetic_field, true)), errors.field
             if hasattr(reading, "rate"):
                 off = subtract(reading.rate, state.rate)
-                begun, grown = off if step == 0 else begun, errors.turned * fast + errors.late * hurried
+                begun, grown = off if count == 0 else begun, errors.turned * fast + errors.late * hurried
                 yield "error of the rate", norm(off), errors.rate + grown
                 # All but the bias is that off at two readings.
                 yield (
