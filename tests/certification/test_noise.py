@@ -148,6 +148,14 @@ def test_what_is_read_by_what_has_no_bound_is_left_out():
     assert "sensor magnetometer" not in left_out(nadir().without("magnetic-unloading"), 0.9973)
 
 
+def test_an_estimator_that_reads_more_than_its_recursion_is_told_of_is_left_out(monkeypatch):
+    """A file of one's own that adds the field to the rate came to 34 times the angle that was proved of it."""
+    assert "estimator mekf" not in left_out(nadir(), 0.9973)
+    monkeypatch.delattr(find("estimator", "mekf").module, "needs")
+    monkeypatch.setattr(find("estimator", "mekf").module, "NEEDS", ("attitude", "rate", "magnetic_field"))
+    assert "estimator mekf" in left_out(nadir(), 0.9973)
+
+
 def test_a_bias_that_the_estimator_takes_out_is_no_error():
     loop = nadir()
     bias = np.linalg.norm(loop.find("gyro").params.bias)

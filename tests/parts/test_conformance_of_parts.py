@@ -1,6 +1,7 @@
 """The conformance suite of parts: those of starhold pass all of it, and each check finds the fault that it is for."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -161,6 +162,71 @@ BROKEN = {
         },
         {"keeps_what_it_says"},
     ),
+    "a target that turns and tells none of it": (
+        "target",
+        {
+            "Goal(params.attitude, ZERO, ZERO)": "Goal(normalise((1.0, 1e-5 * step, 0.0, 0.0)), ZERO, ZERO)",
+            "def examples": "def motion(params, orbit):\n    return Motion(0.0, 0.0)\n\n\ndef examples",
+            "import Card": "import Motion, Card",
+            "from starhold.algebra.quantity": (
+                "from starhold.algebra.quaternion import normalise\nfrom starhold.algebra.quantity"
+            ),
+        },
+        {"keeps_what_it_says"},
+    ),
+    "an acceleration that is larger than it says": ("oblateness", {"3.0 * abs": "2.0 * abs"}, {"keeps_what_it_says"}),
+    "a gradient that is larger than it says": ("oblateness", {"12.0 * abs": "8.0 * abs"}, {"keeps_what_it_says"}),
+    "a bias that does not stay": (
+        "sensor",
+        {
+            "def measure": STAYING.replace("Errors()", "Errors(rate=1e-3, bias=1e-3)").replace("ZERO", "(1e-3, 0.0, 0.0)"),
+            "dice.vector(0, params.noise))), memory": "memory)), scale(-1.0, memory)",
+        },
+        {"keeps_what_it_says"},
+    ),
+    "a field that is farther off than it says": (
+        "magnetometer", {"scaled + math.hypot(*params.bias)": "scaled"}, {"keeps_what_it_says"}
+    ),
+    "a field with more noise than it says": (
+        "magnetometer",
+        {"bias=(2e-7, -1e-7, 3e-7), scale_error=0.002": "bias=ZERO", "field=_deviation": "field=0.4 * _deviation"},
+        {"draws_as_it_says"},
+    ),
+    "a torque that grows in a flight": (
+        "residual-dipole",
+        {
+            "return magnetic_field.field_at(": "return scale(1.0 + 1e-6 * step, magnetic_field.field_at(",
+            "step, params.field)": "step, params.field))",
+            "import ZERO, Vector, ": "import ZERO, Vector, scale, ",
+        },
+        {"keeps_what_it_says"},
+    ),
+    "a torque that is not across the field": (
+        "residual-dipole", {"to_body(state.attitude, memory))": "memory)"}, {"keeps_what_it_says"}
+    ),
+    "directions that scatter the attitude more than it says": (
+        "triad", {"error, math.sqrt((total": "error, 0.2 * math.sqrt((total"}, {"draws_as_it_says"}
+    ),
+    "an estimate that is corrected less than it says": (
+        "complementary-filter", {"0.5 * params.attitude_gain": "0.3 * params.attitude_gain"}, {"errs_as_it_says"}
+    ),
+    "an estimate with more of the gyro's noise than it says": (
+        "complementary-filter", {"scale(noise.rate, random": "scale(0.5 * noise.rate, random"}, {"errs_as_it_says"}
+    ),
+    "an estimate that is behind a body that speeds up": (
+        "complementary-filter", {"0.5 * period)\n\n\ndef": "0.2 * period)\n\n\ndef"}, {"errs_as_it_says"}
+    ),
+    "a rate that is the mean of two readings": (
+        "triad",
+        {
+            "    return measured_or_carried(readings, memory, period, observe)": (
+                "    told, after = measured_or_carried(readings, memory, period, observe)\n"
+                "    mean = tuple(0.5 * (x + y) for x, y in zip(memory.rate, readings.rate, strict=True))\n"
+                "    return told._replace(rate=mean), after"
+            )
+        },
+        {"errs_as_it_says"},
+    ),
     "a unit without the period": ("environment", {"def torque": PREPARED}, {"keeps_units"}),
 }  # fmt: skip
 
@@ -168,7 +234,8 @@ BROKEN = {
 @pytest.mark.parametrize("kind", BROKEN)
 def test_each_fault_is_found(kind, tmp_path):
     role, changes, found_by = BROKEN[kind]
-    (tmp_path / "mine.py").write_text(replaced(PARTS[role][0], *changes.items()))
+    text = PARTS[role][0] if role in PARTS else Path(find_part(role).module.__file__).read_text(encoding="utf-8")
+    (tmp_path / "mine.py").write_text(replaced(text, *changes.items()), encoding="utf-8")
     assert {v.outcome for v in outcomes(find_part(str(tmp_path / "mine.py")), found_by).values()} == {"failed"}
 
 

@@ -17,12 +17,15 @@ from starhold.certification.directions import WIDER, directed, is_directed, show
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import NO_ERRORS, Errors, Noise, Recursion
 from starhold.parts.part import Fitted
+from starhold.parts.vectors import KINDS
 
 Array = NDArray[np.float64]
 TELLING = ("sensor", "estimator")
 """Roles whose `error` affects the law's measurements."""
 PLACED = frozenset(("position", "velocity"))
 """Readings whose errors no part can bound."""
+DIRECTED = {name for names in KINDS.values() for name in names} | {"nadir_is_seen", "magnetic_field_is_new"}
+"""Readings from which attitudes are computed anew."""
 SMALL, MOST, SHARE = 1e-9, 100_000, 0.3
 """The share of an error below which an estimate has forgotten it; the most cycles, from one new attitude to the next, that
 this may take; and about the share that is left after `ago`."""
@@ -101,6 +104,9 @@ def measured(loop: ClosedLoop) -> Measured | None:
     if by_directions and (fix is None or len(estimators) > 1):
         return None
     wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
+    # What else an estimator reads has errors of which its recursion is not told.
+    if estimators and wanted - (DIRECTED if by_directions else {"attitude"}) - {"rate", "attitude_is_new"}:
+        return None
     wanted = {"rate"} if by_directions else wanted
     sensors = tuple(f for f in loop.used("sensor") if wanted & shown(f))
     bounds = [bounded(f, loop.period, bool(estimators)) for f in sensors]
@@ -138,7 +144,7 @@ def measured(loop: ClosedLoop) -> Measured | None:
     recursion: Recursion | None = tell(given[0], noise, *given[1:])
     if recursion is None:
         return None
-    amiss = _estimated(recursion, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
+    amiss = estimated(recursion, tell, given, noise, [bound for _, bound in rates], [bound for _, bound in attitudes])
     return None if amiss is None else Measured(amiss, recursion, (*sensors, *estimators), random, wider, gaussian)
 
 
@@ -175,7 +181,7 @@ def tells_place(fitted: Fitted) -> bool:
     return not PLACED.isdisjoint((module.Reading if fitted.part.role == "sensor" else module.Estimate)._fields)
 
 
-def _estimated(
+def estimated(
     recursion: Recursion, tell: Any, given: Any, noise: Noise, rates: list[Any], attitudes: list[Any]
 ) -> Told | None:
     """Return the errors of an estimate with errors of its readings besides noise; None where it does not forget them."""

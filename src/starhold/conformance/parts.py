@@ -11,6 +11,7 @@ from starhold.algebra.quaternion import to_reference
 from starhold.algebra.structure import flatten, leaves
 from starhold.algebra.vector import ZERO
 from starhold.conformance.bench import PERIOD, loop_with, momentum_of, sample_loop
+from starhold.conformance.recursion import errs_as_it_says
 from starhold.conformance.saying import keeps_what_it_says
 from starhold.conformance.scatter import draws_as_it_says
 from starhold.conformance.units import SYSTEMS, rescale, rescale_params
@@ -230,4 +231,5 @@ CHECKS = (
     draws_in_its_range,
     keeps_what_it_says,
     draws_as_it_says,
+    errs_as_it_says,
 )

@@ -9,13 +9,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from starhold.algebra.quaternion import NO_TURN, conjugate, multiply, normalise, vector_part
-from starhold.algebra.vector import ZERO, Vector, add, norm, scale, subtract
+from starhold.algebra.quaternion import conjugate, multiply, normalise, to_body, vector_part
+from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, subtract, unit
 from starhold.certification.measured import bounded
-from starhold.certification.target_motion import motion_of
 from starhold.certification.unmodelled import COMMANDED, envelope_of
 from starhold.conformance.bench import PERIOD, Jumping, anywhere, loop_with, momentum_of, moving
-from starhold.conformance.directions import misdirected, tells
+from starhold.conformance.directions import field_at, misdirected, tells
+from starhold.conformance.motions import moves_as_it_says, pulls_as_it_says
 from starhold.conformance.verdicts import STEPS, NotApplicableError, require
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import UNBOUNDED, Errors, Push
@@ -24,20 +24,28 @@ from starhold.parts.part import Fitted, Part
 from starhold.parts.random import Dice
 from starhold.simulation.lane import fly
 
+LATER = 720720
+"""So many control steps are a multiple of all numbers of up to 16."""
+
 
 def keeps_what_it_says(part: Part) -> None:
     """No torque is larger than its `bound` or changes faster than its `torque_change`, no error is larger than its `error`,
-    `direction` or `combined`, besides its `noise`, and no motion of a target than its `motion`; outputs follow commands as
-    it says by `late`."""
+    `direction` or `combined`, besides its `noise`, no motion of a target than its `motion`, and no acceleration than its
+    `perturbation`; outputs follow commands as it says by `late`."""
     if part.hook("late") is not None:
         _follows_as_it_says(part)
         return
     # A body has an equation of this name.
     if part.role == "target" and part.hook("motion") is not None:
-        _moves_as_it_says(part)
+        moves_as_it_says(part)
         return
     tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
-    if not (tells(part) or tell_torque or tell_errors or tell_change):
+    bounds = tells(part) or tell_torque or tell_errors or tell_change
+    if part.hook("perturbation") is not None:
+        pulls_as_it_says(part)
+        if not bounds:
+            return
+    if not bounds:
         raise NotApplicableError("it says no bound of its torque, of its errors or of its motion")
     for params in part.examples():
         loop = loop_with(part, params)
@@ -104,24 +112,6 @@ def _follows_as_it_says(part: Part) -> None:
             require(aside <= 1e-9 * float(off @ off), "it comes nearer otherwise in each component")
 
 
-def _moves_as_it_says(part: Part) -> None:
-    """Check a target's rate and acceleration at points of the orbit and instants of a year or of the time that it states."""
-    for params in part.examples():
-        loop, random = loop_with(part, params), np.random.default_rng(3)
-        motion = motion_of(loop)
-        if motion is None:
-            continue
-        numbers, module, seen = Fitted(part, params).prepared(loop.period), cast(Any, part.module), NO_TURN
-        for step in np.linspace(0.0, min(motion.until, 3e7) / loop.period, 20 * STEPS):
-            state = loop.start
-            if loop.has("two-body"):
-                position, velocity = at_anomaly(state.position, state.velocity, loop.craft.gravity, 6.3 * random.uniform())
-                state = state._replace(position=position, velocity=velocity)
-            seen, *moved = module.goal(numbers, state, int(step), seen)
-            for name, vector, most in zip(("rate", "acceleration"), moved, motion, strict=False):
-                require(norm(vector) <= most * (1.0 + 1e-9), f"the {name} is {norm(vector):g}, larger than {most:g}")
-
-
 def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:
     """Yield torques and errors of a part at states of a flight and at other attitudes, with their bounds."""
     dice = Jumping() if part.hook("noise") else Dice((1, 2), 3, 0)
@@ -132,25 +122,38 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
         return push.torque + push.per_rate * norm(state.rate)
 
     memory = fitted.remembered(numbers, *([loop.start] if part.role in ("sensor", "estimator") else []))
-    states = (moving if errors.grow else anywhere)(loop, random)
-    for step, (state, fast, hurried) in enumerate(islice(states, STEPS)):
+    states, begun = (moving if errors.grow else anywhere)(loop, random), ZERO
+    for count, (state, fast, hurried) in enumerate(islice(states, STEPS)):
+        # Now and then much later, at a step of the same phase of all that comes every few.
+        step = count + LATER * (count // 8)
         if part.role == "environment":
             # On all of the orbit.
             place, speed = at_anomaly(state.position, state.velocity, loop.craft.gravity, 2.0 * pi * random.uniform())
             state = state._replace(position=place, velocity=speed) if loop.has("two-body") else state
             memory = module.update(memory, state, numbers, dice, step) if part.hook("update") else memory
-            yield "torque", norm(module.torque(state, numbers, loop.craft, memory)), most(torque, state)
+            acting = module.torque(state, numbers, loop.craft, memory)
+            yield "torque", norm(acting), most(torque, state)
+            if part.flag("ACROSS_FIELD"):
+                along = unit(to_body(state.attitude, field_at(fitted.params, state.position, step * loop.period)))
+                yield "part of the torque along the field", abs(dot(acting, along)), 1e-3 * torque.torque
         elif part.role == "sensor":
             reading, memory = module.measure(state, memory, numbers, dice, step)
             if hasattr(reading, "attitude"):
                 # The angle, for either sign of the quaternion.
                 turn = 2.0 * norm(vector_part(multiply(conjugate(state.attitude), reading.attitude)))
                 yield "error of the attitude", turn, errors.attitude + errors.turning * fast
+            if hasattr(reading, "magnetic_field") and getattr(reading, "magnetic_field_is_new", 1.0) > 0.5:
+                true = to_body(state.attitude, field_at(fitted.params, state.position, step * loop.period))
+                yield "error of the field", norm(subtract(reading.magnetic_field, true)), errors.field
             if hasattr(reading, "rate"):
+                off = subtract(reading.rate, state.rate)
+                begun, grown = off if count == 0 else begun, errors.turned * fast + errors.late * hurried
+                yield "error of the rate", norm(off), errors.rate + grown
+                # All but the bias is that off at two readings.
                 yield (
-                    "error of the rate",
-                    norm(subtract(reading.rate, state.rate)),
-                    errors.rate + errors.turned * fast + errors.late * hurried,
+                    "change of the error of the rate",
+                    norm(subtract(off, begun)),
+                    2.0 * (errors.rate - errors.bias + grown),
                 )
         elif part.role == "actuator" and part.hook("command"):
             torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())

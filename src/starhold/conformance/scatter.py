@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import conjugate, multiply, vector_part
 from starhold.algebra.vector import ZERO, Vector, add, norm, scale, subtract, unit
 from starhold.certification.measured import bounded
 from starhold.conformance.bench import loop_with
-from starhold.conformance.directions import sky_at
+from starhold.conformance.directions import scattered, sky_at, turn_between
 from starhold.conformance.verdicts import NotApplicableError, require
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS, Direction, Noise, Place
@@ -38,8 +37,9 @@ class Scatter(NamedTuple):
 
 
 def draws_as_it_says(part: Part) -> None:
-    """Random errors are no larger than its `noise` or `direction` says, and independent; a place is within its `place`."""
-    if not any(map(part.hook, ("noise", "direction", "place"))):
+    """Random errors are no larger than its `noise`, `direction` or `combined` says, and new each time; a place is within its
+    `place`."""
+    if not any(map(part.hook, ("noise", "direction", "place", "combined"))):
         raise NotApplicableError("it says nothing of random errors")
     for params in part.examples():
         loop = loop_with(part, params)
@@ -54,10 +54,12 @@ def draws_as_it_says(part: Part) -> None:
                 )
         if part.hook("place"):
             _places(fitted, loop)
+        for size, most in scattered(fitted, loop) if part.hook("combined") else ():
+            require(size <= MORE * most, f"random part of the attitude has a deviation of {size:g}, that said {most:g}")
 
 
 def _scatters(fitted: Fitted, loop: ClosedLoop) -> Iterator[Scatter]:
-    """Yield the random errors of a part with bounds: of a torque, of an attitude or a rate, of a direction."""
+    """Yield the random errors of a part with bounds: of a torque, of an attitude, a rate or a field, of a direction."""
     part, module, each = fitted.part, fitted.part.module, READINGS * np.eye(3)
     tell: Any = part.hook("noise")
     noise: Noise = Noise() if tell is None else tell(fitted.params, loop.period)
@@ -70,13 +72,15 @@ def _scatters(fitted: Fitted, loop: ClosedLoop) -> Iterator[Scatter]:
         walk = (sum(k * k for k in range(READINGS)) / READINGS + BEFORE * READINGS) * noise.walk**2
         turns = np.array(noise.attitude)
         said = {"rate": (noise.rate**2 + walk) * each, "attitude": turns @ turns.T * READINGS}
-        steps = {"rate": _steps(errors.rate - errors.bias, noise.rate), "attitude": _steps(errors.attitude, turns.max())}
+        said["magnetic_field"] = noise.field**2 * each
+        steps = {"magnetic_field": _steps(errors.field, noise.field)}
+        steps |= {"rate": _steps(errors.rate - errors.bias, noise.rate), "attitude": _steps(errors.attitude, turns.max())}
         for name in said.keys() & {*module.Reading._fields}:
             yield Scatter(f"error of the {name}", _sums(fitted, loop, name, noise.every), said[name], steps[name])
     if part.hook("direction"):
         seen: Direction = module.direction(fitted.params, loop.period, sky_at(fitted.params, loop))
         if isfinite(seen.error):
-            sums = _sums(fitted, loop, KINDS[seen.of][0], seen.every)
+            sums = _sums(fitted, loop, KINDS[seen.of][0], seen.every, as_direction=True)
             steps_of = _steps(seen.error, seen.deviation)
             yield Scatter(f"error of the {seen.of}", sums, seen.deviation**2 * each, steps_of)
 
@@ -87,7 +91,7 @@ def _steps(error: float, deviation: float) -> float:
     return 2.0 * error * float(np.sqrt(READINGS)) if error > 2.0 * deviation else 0.0
 
 
-def _sums(fitted: Fitted, loop: ClosedLoop, name: str, every: int) -> Array:
+def _sums(fitted: Fitted, loop: ClosedLoop, name: str, every: int, as_direction: bool = False) -> Array:
     """Return sums of the differences of readings with and without random numbers, of those that are new."""
     module, numbers, summed = fitted.part.module, fitted.prepared(loop.period), np.zeros((FLIGHTS, 3))
 
@@ -102,16 +106,15 @@ def _sums(fitted: Fitted, loop: ClosedLoop, name: str, every: int) -> Array:
     for flight in range(FLIGHTS):
         for quiet, seen in zip(still, readings(lambda step, flight=flight: Dice((1, flight), step, 0)), strict=True):
             if all(getattr(one, flag, 1.0) > 0.5 for one in (seen, quiet) for flag in flags):
-                summed[flight] += _apart(name, getattr(quiet, name), getattr(seen, name))
+                summed[flight] += _apart(name, getattr(quiet, name), getattr(seen, name), as_direction)
     return summed
 
 
-def _apart(name: str, quiet: Any, seen: Any) -> Vector:
+def _apart(name: str, quiet: Any, seen: Any, as_direction: bool) -> Vector:
     """Return by how much a reading differs from another one, as a rotation (rad) if it is an attitude."""
     if name == "attitude":
-        turned = multiply(conjugate(quiet), seen)
-        return scale(2.0 if turned[0] >= 0.0 else -2.0, vector_part(turned))
-    return subtract(seen, quiet) if name == "rate" else subtract(unit(seen), unit(quiet))
+        return turn_between(quiet, seen)
+    return subtract(unit(seen), unit(quiet)) if as_direction else subtract(seen, quiet)
 
 
 def _torques(fitted: Fitted, loop: ClosedLoop) -> Array:
