@@ -60,6 +60,8 @@ def pytest_collection_finish(session):
     """Leave what is loaded by now out of the collections of garbage, and keep what is proved in one folder of the run."""
     gc.collect()
     gc.freeze()
+    # What is frozen does not count, so that by default all that tests have left would be gone through again and again.
+    gc.set_threshold(20_000, 20, 20)
     gc.enable()
     share(session.config._tmp_path_factory.getbasetemp() / "proofs")
 

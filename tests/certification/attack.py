@@ -11,8 +11,9 @@ from starhold.simulation.lanes import simulate_many
 from tests.kernel.flights import along, cross, times, turn
 from tests.kernel.oracle import Oracle
 from tests.kernel.planned import Planned as Plans
+from tests.tiers import fewer
 
-LANES, PERIODS, SETTLED = 96, 2000, 40.0
+LANES, PERIODS, SETTLED = 96, fewer(2000, 4), 40.0
 """Lanes of a fleet, the most periods that they fly, and the time in units of the loop's own after which nothing is left of
 how flights on target begin."""
 

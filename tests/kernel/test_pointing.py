@@ -25,7 +25,7 @@ from starhold.kernel.theorems.response import Response
 from tests.kernel.certificates import POINTING, contents, failing, flying, text
 from tests.kernel.flights import Fleet, along, feedback, moved, turn
 from tests.kernel.oracle import Oracle, number
-from tests.tiers import leading
+from tests.tiers import fewer, leading
 
 PROVED = {"cubesat": 0.10, "moving": 0.13, "skew": 0.10, "body": 0.13, "calm": 0.10, "noisy": 0.40}
 """Within how many degrees motions are to end."""
@@ -348,7 +348,7 @@ def test_no_flight_leaves_what_is_proved_and_some_come_near(name, reached):
     (q, w), (target, _) = fleet.at_rest(told[2]), fleet.at_rest(0.0)
     near = np.arange(fleet.lanes) >= fleet.lanes // 2
     q[:, near], worst, V = target[:, near], 0.0, Oracle(contents("flying", name), contents("flying", name)["claims"][0])
-    for k, attitude, rate in fleet.fly(q, w, 3000):
+    for k, attitude, rate in fleet.fly(q, w, fewer(3000, 2)):
         ended = near | (k * fleet.h > n["settling"])
         worst = max(worst, float(turn(attitude)[ended].max()))
         assert np.linalg.norm(rate, axis=0)[ended].max() <= n["end.rate"]
