@@ -192,6 +192,7 @@ BROKEN = {
         {"bias=(2e-7, -1e-7, 3e-7), scale_error=0.002": "bias=ZERO", "field=_deviation": "field=0.4 * _deviation"},
         {"draws_as_it_says"},
     ),
+    "an error from longer ago than it says": ("star-tracker", {"ago=late": "ago=0.25 * late"}, {"keeps_what_it_says"}),
     "a torque that grows in a flight": (
         "residual-dipole",
         {

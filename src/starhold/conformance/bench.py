@@ -1,7 +1,9 @@
 """The spacecraft, states and loops with which laws are examined."""
 
 import math
+from collections import deque
 from collections.abc import Iterator
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -88,19 +90,21 @@ def anywhere(loop: ClosedLoop, random: np.random.Generator) -> Iterator[tuple[An
         yield loop.start._replace(attitude=attitude, rate=rate), 0.0, 0.0
 
 
-def moving(loop: ClosedLoop, random: np.random.Generator) -> Iterator[tuple[Any, float, float]]:
-    """Yield states of a rigid body that accelerates anyhow, with its largest rate and acceleration so far: errors that grow
-    with these have bounds there."""
-    state, fast, hurried = loop.start, norm(loop.start.rate), 0.0
-    while True:
-        yield state, fast, hurried
+def moving(loop: ClosedLoop, random: np.random.Generator, ago: float) -> Iterator[tuple[Any, float, float]]:
+    """Yield states of a rigid body that accelerates anyhow and rests now and then, with its largest rate and acceleration of
+    the last `ago` seconds: errors that grow with these have bounds there."""
+    state, recent = loop.start, deque([(norm(loop.start.rate), 0.0)], math.ceil(ago / loop.period) + 1)
+    for step in count(1):
+        yield state, *(max(sizes) for sizes in zip(*recent, strict=True))
         change: Any = tuple(random.normal(size=3).tolist())
+        if step % 15 >= 8:
+            change = scale(-1.0 / loop.period, state.rate)
         rate = add(state.rate, scale(loop.period, change))
         turn = scale(0.25 * loop.period, add(rate, state.rate))
         half = norm(turn)
         onward = (math.cos(half), *scale(math.sin(half) / half if half else 1.0, turn))
         state = state._replace(rate=rate, attitude=normalise(multiply(state.attitude, onward)))
-        fast, hurried = max(fast, norm(rate)), max(hurried, norm(change))
+        recent.append((norm(rate), norm(change)))
 
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:

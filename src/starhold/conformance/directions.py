@@ -52,7 +52,7 @@ def _of_sensor(part: Part, loop: ClosedLoop) -> Iterator[tuple[str, float, float
     module, random, numbers = part.module, np.random.default_rng(1), fitted.prepared(loop.period)
     memory, params = fitted.remembered(numbers, loop.start), fitted.params
     said: Direction = module.direction(params, loop.period, sky_at(params, loop)._replace(speed=0.0))
-    states = (moving if said.late else anywhere)(loop, random)
+    states = moving(loop, random, said.late) if said.late else anywhere(loop, random)
     for step, (state, fast, _) in enumerate(islice(states, 2 * STEPS)):
         reading, memory = module.measure(state, memory, numbers, Silent(), step)
         name, *flags = KINDS[said.of]

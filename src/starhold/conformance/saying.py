@@ -122,7 +122,8 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
         return push.torque + push.per_rate * norm(state.rate)
 
     memory = fitted.remembered(numbers, *([loop.start] if part.role in ("sensor", "estimator") else []))
-    states, begun = (moving if errors.grow else anywhere)(loop, random), ZERO
+    states = moving(loop, random, errors.ago) if errors.grow else anywhere(loop, random)
+    begun, at_first = ZERO, 0.0
     for count, (state, fast, hurried) in enumerate(islice(states, STEPS)):
         # Now and then much later, at a step of the same phase of all that comes every few.
         step = count + LATER * (count // 8)
@@ -147,13 +148,14 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
                 yield "error of the field", norm(subtract(reading.magnetic_field, true)), errors.field
             if hasattr(reading, "rate"):
                 off = subtract(reading.rate, state.rate)
-                begun, grown = off if count == 0 else begun, errors.turned * fast + errors.late * hurried
+                grown = errors.turned * fast + errors.late * hurried
+                begun, at_first = (off, grown) if count == 0 else (begun, at_first)
                 yield "error of the rate", norm(off), errors.rate + grown
                 # All but the bias is that off at two readings.
                 yield (
                     "change of the error of the rate",
                     norm(subtract(off, begun)),
-                    2.0 * (errors.rate - errors.bias + grown),
+                    2.0 * (errors.rate - errors.bias) + grown + at_first,
                 )
         elif part.role == "actuator" and part.hook("command"):
             torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
