@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
 from starhold.files import clear_unfinished
-from starhold.processes import can_fork, has_others
+from starhold.processes import can_fork
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -37,7 +37,7 @@ class Painter:
     def __init__(self, wanted: bool = True) -> None:
         self._wanted, self._process = wanted, None
         self._folder: Path | None = None
-        if wanted and has_others():
+        if wanted and can_fork() and len(os.sched_getaffinity(0)) > 1:
             self._start()
 
     def _start(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -89,7 +88,6 @@ def _fly(
     timed where a process gives the commands."""
     if proof and not certify:
         raise InputError("compare" if nested else "run", "--proof", "--no-certify too", "one of the two")
-    from starhold.processes import aside
     from starhold.report.painter import Painter
 
     # The plotting library loads while the scenario is read and laws fly.
@@ -145,22 +143,17 @@ def _fly(
                     said = f"The commands came from {process}: nothing is proved about it."
                     console.print(said, soft_wrap=True, markup=False)
                 painter.draw(scenario, flights, folder)
-            except BaseException:
-                # No flight is lost if drawing fails.
+            finally:
+                # The table does not wait for the figures, and no flight is lost if drawing fails.
                 keep(flights[-1])
-                raise
 
-        with aside(partial(keep, flights[-1])):
-            if certify and process is None:
-                flights = [
-                    studies.prove(scenario, *trio, pointing=proof) for trio in zip(entries, loops, flights, strict=True)
-                ]
-            if any(flight.certificates for flight in flights):
-                from starhold.cli.show_certificates import print_proved
+        if certify and process is None:
+            flights = [studies.prove(scenario, *trio, pointing=proof) for trio in zip(entries, loops, flights, strict=True)]
+        if any(flight.certificates for flight in flights):
+            from starhold.cli.show_certificates import print_proved
 
-                print_proved(flights)
-            report = write_results(scenario, flights, folder, pictures is not Drawn.NONE)
-        print_results(report)
+            print_proved(flights)
+        print_results(write_results(scenario, flights, folder, pictures is not Drawn.NONE))
         painter.finish()
     return flights
 
