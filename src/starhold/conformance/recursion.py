@@ -22,7 +22,7 @@ from starhold.parts.part import Fitted, Part
 from starhold.parts.vectors import KINDS
 
 Array = NDArray[np.float64]
-PERIOD, EVERY, SETTLED, STEPS, NEAR = 1.0, 2, 3000, 400, 0.05
+PERIOD, EVERY, SETTLED, STEPS, NEAR = 1.0, 2, 2000, 160, 0.05
 """A control period (s) and so many between attitudes; the steps after which estimates count as settled, those of a flight
 with errors after that, and the share by which errors may differ from what is said."""
 TURN, RATE, WALK, SPEEDING = 1e-6, 3e-7, 1e-9, (1e-5, 2e-5, -1e-5)
