@@ -4,7 +4,7 @@ import math
 from collections import deque
 from collections.abc import Iterator
 from itertools import count
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -82,11 +82,23 @@ def call(law: Law, measurement: Measurement, gains: Any, craft: Craft = CRAFT) -
     return law.command(measurement, gains, craft, law.remember(gains, craft, measurement.period))[0]
 
 
+def any_attitude(random: np.random.Generator) -> Quaternion:
+    """Return a random attitude."""
+    drawn = random.normal(size=4)
+    return cast(Quaternion, tuple((drawn / np.linalg.norm(drawn)).tolist()))
+
+
+def turned(attitude: Quaternion, before: Vector, after: Vector, period: float) -> Quaternion:
+    """Return the attitude after a period in which the body turns at the mean of two rates (rad/s)."""
+    turn = scale(0.25 * period, add(before, after))
+    half = norm(turn)
+    return normalise(multiply(attitude, (math.cos(half), *scale(math.sin(half) / half if half else 1.0, turn))))
+
+
 def anywhere(loop: ClosedLoop, random: np.random.Generator) -> Iterator[tuple[Any, float, float]]:
     """Yield states of a rigid body at any attitudes and rates, and two zeros."""
     while True:
-        turned = random.normal(size=4)
-        attitude, rate = (tuple(x.tolist()) for x in (turned / np.linalg.norm(turned), random.normal(size=3)))
+        attitude, rate = any_attitude(random), tuple(random.normal(size=3).tolist())
         yield loop.start._replace(attitude=attitude, rate=rate), 0.0, 0.0
 
 
@@ -100,10 +112,7 @@ def moving(loop: ClosedLoop, random: np.random.Generator, ago: float) -> Iterato
         if step % 15 >= 8:
             change = scale(-1.0 / loop.period, state.rate)
         rate = add(state.rate, scale(loop.period, change))
-        turn = scale(0.25 * loop.period, add(rate, state.rate))
-        half = norm(turn)
-        onward = (math.cos(half), *scale(math.sin(half) / half if half else 1.0, turn))
-        state = state._replace(rate=rate, attitude=normalise(multiply(state.attitude, onward)))
+        state = state._replace(rate=rate, attitude=turned(state.attitude, state.rate, rate, loop.period))
         recent.append((norm(rate), norm(change)))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from starhold.algebra.quaternion import Quaternion, conjugate, multiply, to_body, vector_part
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO, Vector, add, cross, dot, norm, scale, unit
-from starhold.conformance.bench import anywhere, moving
+from starhold.conformance.bench import any_attitude, anywhere, moving
 from starhold.conformance.verdicts import STEPS
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts import as_built, magnetic_field, sun
@@ -118,7 +118,7 @@ def estimated_amid(
     with these errors of directions of a kind and of true ones; None where it computes none."""
     module, numbers = cast(Any, fitted.part.module), fitted.prepared(loop.period)
     position = scale(norm(loop.start.position), unit(_drawn(random)))
-    attitude: Any = tuple((lambda q: q / np.linalg.norm(q))(random.normal(size=4)).tolist())
+    attitude = any_attitude(random)
     there = inertial_directions(fitted.params, position, 0.0)
     shown: dict[str, Any] = {"position": position, "rate": ZERO, "sun_is_seen": 1.0, "nadir_is_seen": 1.0}
     for kind in kinds_of(fitted):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from math import cos, sin
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +13,7 @@ from starhold.algebra.quaternion import Quaternion, multiply, normalise, to_body
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO, Matrix, Vector, add, norm, scale, subtract
 from starhold.certification.measured import estimated
-from starhold.conformance.bench import loop_with
+from starhold.conformance.bench import loop_with, turned
 from starhold.conformance.directions import inertial_directions, turn_between
 from starhold.conformance.verdicts import NotApplicableError, require
 from starhold.parts.contract import NO_ERRORS, Noise, Recursion
@@ -157,6 +156,4 @@ def _state(attitude: Quaternion, rate: Vector, speeding: Vector) -> Iterator[tup
     while True:
         yield attitude, rate
         after = add(rate, scale(PERIOD, speeding))
-        turn = scale(0.25 * PERIOD, add(rate, after))
-        half = norm(turn)
-        attitude, rate = normalise(multiply(attitude, (cos(half), *scale(sin(half) / half, turn)))), after
+        attitude, rate = turned(attitude, rate, after, PERIOD), after

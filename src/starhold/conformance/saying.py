@@ -9,12 +9,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from starhold.algebra.quaternion import conjugate, multiply, normalise, to_body, vector_part
+from starhold.algebra.quaternion import multiply, normalise, to_body
 from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, subtract, unit
 from starhold.certification.measured import bounded
 from starhold.certification.unmodelled import COMMANDED, envelope_of
-from starhold.conformance.bench import PERIOD, Jumping, anywhere, loop_with, momentum_of, moving
-from starhold.conformance.directions import field_at, misdirected, tells
+from starhold.conformance.bench import PERIOD, Jumping, any_attitude, anywhere, loop_with, momentum_of, moving
+from starhold.conformance.directions import field_at, misdirected, tells, turn_between
 from starhold.conformance.motions import moves_as_it_says, pulls_as_it_says
 from starhold.conformance.verdicts import STEPS, NotApplicableError, require
 from starhold.loop.closed_loop import ClosedLoop
@@ -71,8 +71,8 @@ def _changes(part: Part, loop: ClosedLoop, change: Push) -> Iterator[tuple[str, 
     random, time = np.random.default_rng(2), 1e-3
     memory = module.remember(numbers) if part.hook("remember") else None
     for rate in (ZERO, *(cast(Any, tuple(x)) for x in random.normal(size=(STEPS, 3)).tolist())):
-        for turned in random.normal(size=(STEPS, 4)):
-            attitude: Any = tuple((turned / np.linalg.norm(turned)).tolist())
+        for _ in range(STEPS):
+            attitude = any_attitude(random)
             torques: list[Vector] = []
             for t in (-time, time):
                 state = loop.start._replace(
@@ -140,9 +140,8 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
         elif part.role == "sensor":
             reading, memory = module.measure(state, memory, numbers, dice, step)
             if hasattr(reading, "attitude"):
-                # The angle, for either sign of the quaternion.
-                turn = 2.0 * norm(vector_part(multiply(conjugate(state.attitude), reading.attitude)))
-                yield "error of the attitude", turn, errors.attitude + errors.turning * fast
+                turn = turn_between(state.attitude, reading.attitude)
+                yield "error of the attitude", norm(turn), errors.attitude + errors.turning * fast
             if hasattr(reading, "magnetic_field") and getattr(reading, "magnetic_field_is_new", 1.0) > 0.5:
                 true = to_body(state.attitude, field_at(fitted.params, state.position, step * loop.period))
                 yield "error of the field", norm(subtract(reading.magnetic_field, true)), errors.field

@@ -63,7 +63,7 @@ def _struct(name: str, parts: list[tuple[str, Type]], elements: str = "", text: 
 
 
 WIDTH = 104
-"""Of lines of comments."""
+"""Comments are wrapped to lines of this length."""
 VECTOR = _struct("vector_t", [(axis, DOUBLE) for axis in "xyz"], text="Components along the axes.")
 QUATERNION = _struct("quaternion_t", [(f"q{k}", DOUBLE) for k in range(4)], text="Scalar part first, Hamilton product.")
 MATRIX = _struct("matrix_t", [(f"row[{k}]", VECTOR) for k in range(3)], "row", "Rows of a 3x3 matrix.")
