@@ -8,6 +8,7 @@ the motion, and the effects of their changes. Docs/kernel.md, 10.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
@@ -48,6 +49,8 @@ from .regions import (
 )  # fmt: skip
 
 WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
+KINETIC = "kinetic"
+"""A bound of w.Jw in all motions."""
 NEARER = Fraction(17, 16)
 """Errors that grow with the motion count as settled within this factor of their limit."""
 
@@ -74,7 +77,7 @@ class Held(Follower):
         self.moving = [[numbers.get(f"error.{name}.per.{x}") or ZERO for x in of] for name in ("attitude", "rate")]
         self.ago, self.held_back = (numbers.get(f"error.{name}") or ZERO for name in ("ago", "kept"))
         demand(self.held_back < 1, "errors are not forgotten")
-        self.off = loop.off if "tolerance" in numbers else ZERO
+        self.off, self.kinetic = loop.off if "tolerance" in numbers else ZERO, numbers.get(KINETIC)
         self.led, self.hurried = (numbers.get(f"error.target.{name}") or Fraction(0) for name in ("rate", "acceleration"))
         demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
         given = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
@@ -203,6 +206,9 @@ class Held(Follower):
         X = [[c * x for x in row] for row in inverse(self.under)]
         sizes = {name: root(X[i][i]) for i, name in enumerate(STATE)}
         sizes |= lengths(X)
+        if self.kinetic is not None:
+            sizes |= {k: min(sizes[k], root(self.kinetic * self.N[i][i])) for i, k in enumerate(STATE[RATE])}
+            sizes[SPEED] = min(sizes[SPEED], root(self.kinetic * self.light))
         sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in (*STATE[TURN], ANGLE)} | self.of_level(c)
         return Region(X, sizes | self.others, least)
 
@@ -276,13 +282,7 @@ class Held(Follower):
         change, late = self.change_in(tube), self.behind(region.sizes, rest=True)
         push = tube.steady + tube.pushed + late.mean
         demand(push > 0, "nothing pushes")
-        # How far disturbances move the rates from the undisturbed motion, in which momentum turns with the body.
-        calm, slower = self.unlike_body(tube.sizes, self.parted)
-
-        def moved_by(p: Fraction) -> list[Fraction]:
-            columns = [*zip(self.widths, tube.bent, strict=True)]
-            return settled(lambda d: [h * ((p + slower * norm(d)) * n + reach([row], d)[0]) for n, row in columns])
-
+        moved_by, calm = self.mover(tube)
         away = moved_by(push + calm + late.moved - late.mean)
         slope = {name: most(L.slope(name), tube.sizes) for name in ("q0", *STATE)}
         moved = [*tube.drift, *[tube.turned] * 3, *[h * tube.sizes[SPEED] * self.size("h")] * 3]
@@ -330,6 +330,17 @@ class Held(Follower):
             form, paid, spare = self.paid(self.late, change, form, costs)
             rest += paid
         return form, over, F, kept * more, rest, spare
+
+    def mover(self, tube: Tube) -> tuple[Callable[[Fraction], list[Fraction]], Fraction]:
+        """Return how far a torque of some size moves the rates in a period from the undisturbed motion, in which momentum
+        turns with the body; and the torque due to changes of target, momentum and the torque that the law knows."""
+        calm, slower = self.unlike_body(tube.sizes, self.parted)
+        columns, h = [*zip(self.widths, tube.bent, strict=True)], self.h
+
+        def moved_by(p: Fraction) -> list[Fraction]:
+            return settled(lambda d: [h * ((p + slower * norm(d)) * n + reach([row], d)[0]) for n, row in columns])
+
+        return moved_by, calm
 
     def swing(self, tube: Tube) -> Fraction:
         """Return a bound of |V'| between samples."""

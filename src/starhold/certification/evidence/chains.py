@@ -76,6 +76,8 @@ class Chain:
     reached: list[int] = field(default_factory=list[int])
     """After how many samples motions are in each of the levels."""
     samples: int = 0
+    slow: dict[str, float] = field(default_factory=dict[str, float])
+    """The claim's numbers of a bound of the rate."""
 
     @property
     def scales(self) -> dict[str, float]:
@@ -122,7 +124,7 @@ class Chain:
 
     def of_level(self) -> dict[str, Any]:
         """Return the claim's numbers that follow from its level."""
-        late = of_late(self.motion.late)
+        late = of_late(self.motion.late) | self.slow
         if self.motion.plan is None:
             return {"level": self.level} | late
         region = self.motion.region(Fraction(self.level))
@@ -151,7 +153,7 @@ class Chain:
 
     def falls(self, c: Fraction) -> Falls:
         """Return how V decreases from a level."""
-        key = c, self.motion.late
+        key = c, self.motion.late, self.motion.kinetic
         if key not in self.tried:
             self.tried[key] = self.sought(c)
         return self.tried[key]

@@ -8,6 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
 from math import degrees, inf, isfinite, pi, radians, sin, sqrt
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -23,11 +24,12 @@ from starhold.certification.evidence.lates import begun_late, numbers_of, restin
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
-from starhold.certification.evidence.shapes import Shape, largest_in, soft
+from starhold.certification.evidence.shapes import Shape, largest_in
+from starhold.certification.evidence.slow import slowed
 from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
 from starhold.certification.matrices import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled
-from starhold.kernel.held import CHANGE, Held
+from starhold.kernel.held import CHANGE, KINETIC, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand
 from starhold.kernel.plans import Plan
@@ -52,6 +54,7 @@ LEANS = (0.1, 0.18, 0.3, 0.45)
 own V, if it is a form of q, takes the place of the first two terms."""
 RISES = "V does not decrease on the set from which motions start"
 
+Start: TypeAlias = tuple[Shape, dict[str, float]]
 Beginning: TypeAlias = tuple[list[float], float, dict[str, float], list[float]]
 
 
@@ -119,7 +122,7 @@ class Pushed:
         bounded = all(map(isfinite, against.numbers.values()))
         demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
         self.plan: Plan | None = None
-        self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
+        self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Start], str]]()
         self.slow = dict[tuple[Any, ...], list[Chain]]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
@@ -202,7 +205,7 @@ class Pushed:
         """Return whether there is a start set, which is looked for once."""
         key = angle, rate, *limits.items()
         if key not in self.beginnings:
-            shapes = [chain.shape for chain in self.begun(angle, rate, limits)]
+            shapes = [(chain.shape, chain.slow) for chain in self.begun(angle, rate, limits)]
             self.beginnings[key] = shapes, "" if shapes else self.loop.failed[POINTS]
         shapes, why = self.beginnings[key]
         if not shapes:
@@ -221,17 +224,16 @@ class Pushed:
         """Return chains from a start set; none, and the reason in `failed`, where V does not decrease on the set or the
         torque exceeds its limits there. Within limits it is one, by the first V for which neither is so."""
         loop, numbers = self.loop, self.beginning(angle, rate, limits)
-        shapes = [lean.shape for lean in self.leans] if not limits else self.within(angle, rate, limits)
-        loop.failed[POINTS] = RISES if shapes else "the torque exceeds its limit"
-        made = (self.chain(shape, angle, rate) for shape in shapes)
-        together, slow = [] if limits else [*made], list[Chain]()
-        for first in together or made:
+        loop.failed[POINTS], shapes = RISES, [lean.shape for lean in self.leans]
+        together, slow, tried = [] if limits else [self.chain(shape, angle, rate) for shape in shapes], list[Chain](), 0
+        for first in together or self.slowed(shapes, angle, rate, limits):
             # Without limits larger sets may follow, on which disturbances matter less.
+            tried += 1
             if not first.decreases(noticeably=bool(limits)):
                 slow.append(first)
             elif begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
                 return together or [first]
-        if len(slow) == len(shapes):
+        if len(slow) == tried:
             self.slow[angle, rate, *limits.items()] = slow
         return []
 
@@ -240,24 +242,29 @@ class Pushed:
         does, because it takes another level of each."""
         return any(one.wants_more() for one in self.slow.get(start, ()))
 
-    def within(self, angle: float, rate: float, limits: dict[str, float]) -> list[Shape]:
-        """Return shapes of V to try within limits: of those whose set demands little torque, and of the usual ones."""
-        return soft(self.sampled(self.usual[0]).motion, limits, angle, rate, self.usual)
+    def slowed(self, shapes: list[Shape], angle: float, rate: float, limits: dict[str, float]) -> Iterator[Chain]:
+        """Yield chains of each V, first those with bounds that seem to hold in the set of the start."""
+        for shape in shapes:
+            whole = self.chain(shape, angle, rate)
+            for slow in slowed(whole.motion, whole.level, angle, rate, limits):
+                yield self.chain(shape, angle, rate, slow)
+            yield self.chain(shape, angle, rate)
 
     def beginning(self, angle: float, rate: float, limits: dict[str, float]) -> dict[str, Any]:
         """Return the claim's numbers of a start, without its level."""
         begin = {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
         return self.numbers | limits | begin
 
-    def chain(self, shape: Shape, angle: float, rate: float) -> Chain:
-        """Return a chain from the least level set of V that holds a start."""
+    def chain(self, shape: Shape, angle: float, rate: float, slow: Mapping[str, float] = MappingProxyType({})) -> Chain:
+        """Return a chain from the least level set of V that holds a start. slow: the numbers of a bound of the rate."""
         _, V, motion, tried = self.sampled(shape)
+        motion.kinetic = Fraction(slow[KINETIC]) if slow else None
         motion.late = begun_late(motion, sin(min(angle, pi) / 2.0), rate)
         level = largest_in(motion, angle, rate)
         level += float(motion.late.weight * motion.late.begun**2) if motion.late else 0.0
         level *= 1.0 + 1e-6
         motion.late = resting(motion, level)
-        return Chain(motion, V, level, tried, shape)
+        return Chain(motion, V, level, tried, shape, slow=dict(slow))
 
     def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
         """Find the pointing claim of the loop, and add it. The set contains rotations of up to `angle` (rad) at up to `rate`
@@ -266,7 +273,7 @@ class Pushed:
         if not self.may_begin(angle, rate, limits):
             return False
         numbers = self.beginning(angle, rate, limits)
-        begun = [self.chain(shape, angle, rate) for shape in self.beginnings[angle, rate, *limits.items()][0]]
+        begun = [self.chain(shape, angle, rate, slow) for shape, slow in self.beginnings[angle, rate, *limits.items()][0]]
         for chain in begun:
             if chain.descend() < NEARLY * chain.aim() and chain.levels:
                 break

@@ -159,17 +159,11 @@ def contents(loop: AttitudeLoop, V: Poly) -> Part[list[str]]:
     state turned by up to `start.angle` at up to `start.rate`."""
     numbers, q, w, one = loop.claim.numbers, loop.q, loop.w, poly(1)
     level, said = numbers.get("level"), list[str]()
-
-    def near(angle: Fraction) -> list[Poly]:
-        # |q0| and q0 are at least the cosine; for less than a half turn so is q0^2 at least its square.
-        cosine = cosine_below(angle / 2) if angle <= 6 else Fraction(-1)
-        return [q[0] - cosine, *([q[0] * q[0] - cosine * cosine] if cosine >= 0 else [])]
-
     if level is None:
         return said
     inside, angle, rate = level - V, numbers.get("angle"), numbers.get("rate")
     if angle is not None:
-        yield "turns from rest", Squares(inside.at(loop.still), [one, *q], 0, near(angle), [loop.sphere])
+        yield "turns from rest", Squares(inside.at(loop.still), [one, *q], 0, within_turn(loop, angle), [loop.sphere])
         said.append(f"the set holds every rest turned by up to {below(angle)} rad")
     if rate is not None:
         known = [rate * rate - dot(w, w), *loop.heaviest(w)]
@@ -177,11 +171,18 @@ def contents(loop: AttitudeLoop, V: Poly) -> Part[list[str]]:
         said.append(f"on target every rate up to {below(rate)} rad/s")
     if "start.rate" in numbers:
         angle, rate = numbers["start.angle"], numbers["start.rate"]
-        starts = [*near(angle), rate * rate - dot(w, w), *loop.heaviest(loop.leaning)]
+        starts = [*within_turn(loop, angle), rate * rate - dot(w, w), *loop.heaviest(loop.leaning)]
         starts += [dot(q[1:], apply(loop.J, q[1:]))] * loop.near
         yield "states", Squares(inside, [one, *q, *w], 0, starts, [loop.sphere])
         said.append(f"every state turned by up to {below(angle)} rad at up to {below(rate)} rad/s")
     return said
+
+
+def within_turn(loop: AttitudeLoop, angle: Fraction) -> list[Poly]:
+    """Return what is nonnegative for rotations of up to an angle: |q0| and q0 are at least the cosine; for less than a half
+    turn so is q0^2 at least its square."""
+    cosine = cosine_below(angle / 2) if angle <= 6 else Fraction(-1)
+    return [loop.q[0] - cosine, *([loop.q[0] * loop.q[0] - cosine * cosine] if cosine >= 0 else [])]
 
 
 # --- without a preferred axis: V and V' depend on 1 - q0, |w| and the part of q along w alone ---------------------------

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from ..loops import AXES, NONE, AttitudeLoop
-from ..numbers import Rows, definite, demand, inverse, norm, times, transpose
+from ..numbers import Rows, definite, demand, inverse, norm, reach, times, transpose
 from ..polynomials import Poly, apply, dot, poly, var, variables
 from ..programs import joined
 from ..rules import Exceeds, Proof, Squares
@@ -18,17 +18,36 @@ Most: TypeAlias = list[Fraction | None]
 TORQUE, UNIT = "torque-limit", variables("d")
 
 
+class Asking(NamedTuple):
+    """A law asks for `asked` because of the state alone, which stays within a share of each limit about an axis or of a
+    motor. pace: how fast it may approach that (1/s), for each unit that is left. rates: polynomials of the mean rates of
+    change of `asked` from one sample to the next; rest: bounds of what these are besides, about each axis; pushed: of another
+    part, as a vector. begun, still: what is nonnegative, and what is zero, in states at first."""
+
+    share: Fraction
+    pace: Fraction
+    asked: list[Poly]
+    rates: list[Poly]
+    rest: list[Fraction]
+    pushed: Fraction
+    begun: list[Poly]
+    still: Mapping[str, int]
+
+
 def within_limits(
     loop: AttitudeLoop,
     less: Fraction = Fraction(0),
     largest: Sequence[Fraction] | None = None,
     between: Fraction = Fraction(0),
+    slow: Sequence[Poly] = (),
+    asking: Asking | None = None,
 ) -> Proof:
     """On {V <= level}, or everywhere, with external inputs within their bounds: each component of the torque is at most
     `limit` in size (`limit.norm`: their norm); each listed motor gives at most motors.k, each listed wheel stores at most
     stored.k. less: a bound of the torque error due to wrong inputs of the law. largest: a bound of the torque about each
     axis, errors included, if known. between: a bound of the momentum that wheels store between samples beyond what they
-    store at both."""
+    store at both. slow: what is nonnegative besides, as motions stay slow. asking: what keeps the law within
+    limits that it would exceed elsewhere on {V <= level}."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
     limit, longest = numbers.get("limit"), numbers.get("limit.norm")
     count = next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
@@ -57,7 +76,7 @@ def within_limits(
     if count > len(AXES) and any(x is not None for x in stored):
         # Friction, an error of the command, moves momentum between more than three rotors.
         assumed += ["spare-momentum"] * any(numbers.get(name) for name in ("error", "error.per.rate"))
-    known += [level - loop.lyapunov for level in (numbers.get("level"),) if level is not None]
+    known += [*(level - loop.lyapunov for level in (numbers.get("level"),) if level is not None), *slow]
     said, none = list[str](), poly(0)
     reduced = [None if x is None else x - less for x in (limit, longest)]
     limited = [(*load, none) for load in loads("torque", *reduced)] if largest is None else []
@@ -83,6 +102,14 @@ def within_limits(
         for text, unit, bound_of in (("motors give", "N m", motors), ("wheels store", "N m s", stored)):
             if any(x is not None for x in bound_of):
                 said.append(f"{text} no more than {', '.join('inf' if x is None else above(x) for x in bound_of)} {unit}")
+    if asking is not None:
+        asks = [(name, asking.share * bound, row) for name, bound, row, rest in limited if not rest.terms and row is not UNIT]
+        known += [most - dot(row, asking.asked) for _, most, row in asks]
+        for name, most, row in asks:
+            load, more = dot(row, asking.asked), reach([row], asking.rest)[0] + norm(row) * asking.pushed
+            yield f"{name} at first", Squares(most - load.at(asking.still), [poly(1), *q, *w], 0, asking.begun, [loop.sphere])
+            left = asking.pace * (most - load) - dot(row, asking.rates) - more
+            yield f"{name} falls", Squares(left, basis(loop, left), 0, known, [loop.sphere])
     for name, bound, row, rest in limited:
         used = [k for k in AXES if poly(row[k]).terms]
         cases = joined(loop.law[k] for k in used)
@@ -98,6 +125,16 @@ def within_limits(
                 yield full, within(bound, load, z, w, [*case.known, *squared * turned, *known], [loop.sphere])
     with_ = f"with {enumerated(bounds)} " if bounds else ""
     return Statement(with_ + enumerated(said), tuple(assumed), "wheels" if limits else TORQUE)
+
+
+def basis(loop: AttitudeLoop, p: Poly) -> list[Poly]:
+    """Return the terms whose squares and products a polynomial in attitude and rate may be a sum of."""
+    z = [poly(1), *loop.q, *loop.w]
+    if p.degree > 3:
+        z += [a * b for k, a in enumerate(loop.q) for b in loop.q[max(k, 1) :]]
+    elif p.degree > 2:
+        z += [a * b for a in loop.q for b in loop.w]
+    return z
 
 
 def loads(name: str, axis: Fraction | None, norm: Fraction | None) -> Iterator[tuple[str, Fraction, Row]]:

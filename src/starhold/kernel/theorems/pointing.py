@@ -32,6 +32,7 @@ from ..regions import AMISS, ANGLE, AT_REST, RATE, TURN, Tube, as_told, balls
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
+from .kinetic import asking, stays_slow
 from .limits import within_limits
 from .noise import DEVIATION, SHARE, within_radii
 from .response import first_of, responds
@@ -88,7 +89,8 @@ def points(claim: Claim) -> Proof:
     # Wheels take up what is asked for evenly, but for friction and for what is late, each no more than its bound.
     pushed = motion.pushed(tube.sizes)
     between = h / 2 * (pushed["both"] - pushed["outside"] - motion.planned(tube.sizes) + behind_at_most)
-    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques, between)
+    slow = yield from stays_slow(motion, tube)
+    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques, between, slow, asking(motion, tube))
     if loop.signs:
         yield "the sign never changes", Exceeds(region.least, motion.misled(region.sizes)[0] / 2)
     if motion.late and (change := motion.change_in(tube)):
@@ -161,6 +163,7 @@ def points(claim: Claim) -> Proof:
     misread = [("attitude that it is told", motion.turned, "rad"), ("rate", motion.rated, "rad/s")]
     misread += [("target's rate", motion.led, "rad/s"), ("target's acceleration", motion.hurried, "rad/s2")]
     begun = "V <= " + below(numbers["level"] - behind) + ", q0 > 0" * motion.even
+    begun += f", w.Jw <= {below(motion.kinetic)}" if motion.kinetic is not None else ""
     text = bounded_motion(numbers, begun, "", misread)
     text += with_motion(motion)
     text += f", the torque that acts late, {motion.late.in_words}" if motion.late else ""

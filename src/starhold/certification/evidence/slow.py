@@ -1,0 +1,146 @@
+"""Looks for bounds of the body's rate and of the law's torque that motions keep although {V <= level} holds states beyond."""
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.certification.evidence.shapes import shares
+from starhold.certification.evidence.terms import valued
+from starhold.certification.matrices import floats
+from starhold.kernel.held import KINETIC, Held
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.polynomials import Poly, dot
+from starhold.kernel.regions import RATE, STATE, Tube
+from starhold.kernel.theorems.kinetic import (
+    ASKED,
+    ASKED_PACE,
+    CUBIC,
+    PACE,
+    QUARTIC,
+    changing,
+    mean_rate,
+    short,
+    twice_energy,
+)  # fmt: skip
+
+Array = NDArray[np.float64]
+
+PACES = np.geomspace(3e-3, 1.0, 60)
+"""The paces that are tried, in units of one period."""
+WIDER, ROUNDS = 1.03, 8
+"""The ratio of bounds that are tried, and how many are."""
+ROOM, TURNS, SHARES = 1.005, 50, np.geomspace(0.02, 1.0, 25)
+"""How much more of a limit the law may ask for than it does at first, how many turns are examined, and the weights of V beside
+w.Jw in ellipsoids that contain both sets."""
+
+
+def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[str, Any]) -> Iterator[dict[str, float]]:
+    """Yield the claim's numbers of bounds that seem to hold in {V <= level} for motions from a start: of the rate; and if the
+    law asks for more than its limits nonetheless, of that too. The motion is left with the last bound of the rate."""
+    slow = bound_of_rate(motion, level, rate)
+    rows = shares(motion, limits)
+    if slow and len(rows):
+        tube = motion.tube(motion.region(Fraction(level)))
+        if asked := bound_of_torque(motion, tube, level, angle, rate, rows):
+            yield slow | asked
+            return
+    if slow:
+        yield slow
+
+
+def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
+    """Return the numbers of a bound of w.Jw that seems to hold, as small as possible; none where there is none."""
+    motion.kinetic = None
+    G, region, paces = twice_energy(motion), motion.region(Fraction(level)), PACES / float(motion.h)
+    changed = short(mean_rate(motion, G)[0], QUARTIC)
+    ends = [form_of(changed, q0) for q0 in (Fraction(1), max(region.least, Fraction(0)))]
+    root, energy = np.linalg.inv(np.linalg.cholesky(floats(motion.under))), energy_of(motion)
+    begun = float(np.linalg.norm(energy, 2)) * rate**2
+
+    def most(form: Array) -> float:
+        return level * float(np.linalg.eigvalsh(root @ form @ root.T)[-1])
+
+    needed, whole = np.array([max(most(energy + end / pace) for end in ends) for pace in paces]), most(energy)
+    bound = max(float(needed.min()), begun)
+    for _ in range(ROUNDS):
+        bound *= WIDER
+        if bound >= whole:
+            break
+        motion.kinetic = Fraction(bound)
+        try:
+            _, (more,), pushed = changing(motion, motion.tube(motion.region(Fraction(level))), [G], QUARTIC)
+        except RefusedError:
+            break
+        after = needed + float(more + pushed) / paces
+        if max(float(after.min()), begun) < bound:
+            return {KINETIC: bound, PACE: float(paces[int(np.argmin(after))])}
+        bound = max(float(after.min()), begun)
+    motion.kinetic = None
+    return {}
+
+
+def bound_of_torque(
+    motion: Held, tube: Tube, level: float, angle: float, rate: float, rows: Array
+) -> dict[str, float]:
+    """Return the numbers of a bound of what the law asks for because of the state that seems to hold; none where there is
+    none, or where it asks for no more than its limits anyway. rows: what takes the torque to shares of its limits."""
+    inner = inside(motion, level)
+
+    def reached(along: Array) -> float:
+        return float(np.sqrt(np.einsum("li,nij,lj->ln", along, inner, along).min(axis=1).max()))
+
+    torque, each = floats(motion.near.torque), np.linalg.norm(rows, axis=1)
+    spare = float(motion.misread(tube.region)[0]) * float(each.max())
+    if motion.plan is not None or reached(rows @ torque) < 1.0 - spare:
+        return {}
+    rates, more, pushed = changing(motion, tube, motion.u, CUBIC)
+    linear, paces = rows @ np.array([slope_of(p) for p in rates]), PACES / float(motion.h)
+    rest = float((np.abs(rows) @ floats([more])[0] + each * float(pushed)).max())
+    needed = [(reached(rows @ torque + linear / pace) + rest / pace, float(pace)) for pace in paces]
+    share, pace = min(needed)
+    share = max(share, at_first(motion, rows, angle, rate)) * ROOM
+    return {ASKED: share, ASKED_PACE: pace} if share < 1.0 else {}
+
+
+def at_first(motion: Held, rows: Array, angle: float, rate: float) -> float:
+    """Return the largest share of a limit that the law asks for because of a state turned by up to an angle (rad) at up to a
+    rate (rad/s)."""
+    turned, names = np.linspace(0.0, min(angle, np.pi), TURNS), ("q0", *STATE[3:], *STATE[RATE])
+    most = 0.0
+    for row, along in zip(rows, rows @ floats(motion.near.torque), strict=True):
+        q, w = (x / (float(np.linalg.norm(x)) or 1.0) for x in (along[3:], along[:3]))
+        states = [np.cos(turned / 2.0), *np.outer(q, np.sin(turned / 2.0)), *np.outer(rate * w, np.ones(TURNS))]
+        used = valued(dot([Fraction(float(x)) for x in row], motion.u), dict(zip(names, states, strict=True)))
+        most = max(most, float(np.abs(used).max()))
+    return most
+
+
+def inside(motion: Held, level: float) -> Array:
+    """Return matrices of ellipsoids in (w, q), around rest, that contain {V <= level} as far as w.Jw is within its bound."""
+    whole = floats(motion.under) / level
+    if motion.kinetic is None:
+        return np.linalg.inv(whole)[None]
+    slow = energy_of(motion) / float(motion.kinetic)
+    return np.linalg.inv(np.array([c * whole + (1.0 - c) * slow for c in SHARES]))
+
+
+def energy_of(motion: Held) -> Array:
+    """Return the matrix of w.Jw in (w, q)."""
+    energy = np.zeros((6, 6))
+    energy[RATE, RATE] = floats(motion.loop.given)
+    return energy
+
+
+def form_of(p: Poly, q0: Fraction) -> Array:
+    """Return the matrix of a form in (w, q) that a polynomial is at some q0."""
+    at, zero = p.at({"q0": q0}), dict.fromkeys(STATE, 0)
+    return floats([[at.slope(i).slope(k).at(zero).number / 2 for k in STATE] for i in STATE])
+
+
+def slope_of(p: Poly) -> Array:
+    """Return the derivatives of a polynomial of (w, q) at rest on target."""
+    at = dict.fromkeys(STATE, 0) | {"q0": 1}
+    return floats([[p.slope(name).at(at).number for name in STATE]])[0]
