@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.blends import Blended, Parts
+from starhold.certification.evidence.blends import Blended, Shared, rewired
 from starhold.certification.evidence.chains import Chain, Falls
 from starhold.certification.evidence.ellipsoids import MORE
 from starhold.certification.evidence.finding import read
@@ -30,7 +31,8 @@ from starhold.certification.unmodelled import Pushes, change_of_modelled
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand
-from starhold.kernel.plans import Plan
+from starhold.kernel.programs import Program
+from starhold.kernel.reading import Told
 from starhold.kernel.theorems.noise import SHARE
 from starhold.parts.craft import tensor
 
@@ -118,7 +120,6 @@ class Pushed:
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         bounded = all(map(isfinite, against.numbers.values()))
         demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
-        self.plan: Plan | None = None
         self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
         self.slow = dict[tuple[Any, ...], list[Chain]]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
@@ -134,7 +135,9 @@ class Pushed:
         self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
         slow = sqrt(self.stiffness / float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1]))
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
-        self.known, self.parts = dict[Shape, Lean](), Parts()
+        self.known, self.shared = dict[Shape, Lean](), Shared()
+        wired.claim = replace(wired.claim, evidence=Told("evidence", self.evidence))
+        self.wired = wired
         self.usual = [Shape(float(f"{lean * slow:.4g}")) for lean in LEANS]
 
     @cached_property
@@ -148,9 +151,7 @@ class Pushed:
         if shape not in self.known:
             s = None if self.even else self.stiffness
             V = self.loop.crossed(s, shape.epsilon) if shape in self.usual else self.loop.softened(s, shape)
-            wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
-            motion = Blended(wired, self.plan, self.parts)
-            self.plan = motion.plan
+            motion = Blended(rewired(self.wired, self.numbers, Program.read(self.loop.by_digest[V])), self.shared)
             if self.radii:
                 motion.sways(self.radii)
             motion.late = weighed(motion, self.scales)
@@ -229,7 +230,7 @@ class Pushed:
             # Without limits larger sets may follow, on which disturbances matter less.
             if not first.decreases(noticeably=bool(limits)):
                 slow.append(first)
-            elif begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
+            elif begins(loop, first.motion, numbers | first.of_level(), first.scales):
                 return together or [first]
         if len(slow) == len(shapes):
             self.slow[angle, rate, *limits.items()] = slow

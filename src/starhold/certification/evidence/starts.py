@@ -11,15 +11,17 @@ from numpy.typing import NDArray
 
 from starhold.certification.assumptions import as_it_starts
 from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.blends import renumbered
 from starhold.certification.evidence.cones import interior_point
-from starhold.certification.evidence.finding import NotFoundError, evidence, read
+from starhold.certification.evidence.finding import NotFoundError, evidence
 from starhold.certification.evidence.sparse import entries_of
 from starhold.certification.evidence.squares import DEFINITE, cofactors, equations, free, posed, settled
+from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.rules import Squares
-from starhold.kernel.theorems.pointing import points
+from starhold.kernel.theorems.pointing import descends
 from starhold.loop.closed_loop import ClosedLoop
 
 Array = NDArray[np.float64]
@@ -31,12 +33,12 @@ def start_rate(loop: ClosedLoop) -> float:
     return float(np.linalg.norm(as_it_starts(loop).rate))
 
 
-def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
-    """Return whether the set of a claim without levels is sound, and the torque keeps its limits on it, as far as floats
-    tell."""
+def begins(loop: Loop, motion: Held, numbers: Mapping[str, Any], scales: Mapping[str, float]) -> bool:
+    """Return whether the set of a claim with these numbers, but without levels, is sound, and the torque keeps its limits on
+    it, as far as floats tell."""
     try:
-        shown = points(read(claim | {"numbers": claim["numbers"] | {"highest": "0"}}, loop.by_digest))
-        wanted = dict(takewhile(lambda one: one[0] != "V between samples", shown))
+        begun = renumbered(motion, {**numbers, "highest": 0})
+        wanted = dict(takewhile(lambda one: one[0] != "V between samples", descends(begun.loop, begun)))
         for name, o in wanted.items():
             chance = likely(o, scales) if isinstance(o, Squares) else None
             if chance is None:
