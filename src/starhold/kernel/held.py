@@ -164,7 +164,7 @@ class Held(Follower):
         """Return the mean of -V' over a period without disturbances, up to a derivative of V', then that derivative, and its
         share in the mean: the law's torque is held, and wheels' momentum turns against the body."""
         rates, shares = [self.rate], [Fraction(1)]
-        while len(rates) < ORDER and len(rates[-1].terms) < LONG:
+        while len(rates) < ORDER and len(rates[-1].upper) < LONG:
             rates.append(self.further(rates))
             shares.append(shares[-1] * self.h / len(rates))
         return factored(-self.by_law(rates, shares)), rates[-1], shares[-1] * self.h / (len(rates) + 1)

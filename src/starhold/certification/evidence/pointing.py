@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
+from copy import copy
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
@@ -86,7 +87,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
 def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pushed]:
     """Return the searches by the law's own even V and by another, that of the larger start first."""
     first = Pushed(loop, against, noisy)
-    both = [first, Pushed(loop, against, noisy, given=False)] if first.even else [first]
+    both = [first, first.by_another()] if first.even else [first]
     angle, rate = both[-1].start(*begin) if first.even else (0.0, 0.0)
     return both if not angle or first.may_begin(angle, rate, begin[2]) else both[::-1]
 
@@ -103,7 +104,7 @@ class Lean(NamedTuple):
 class Pushed:
     """A loop under unmodelled torques and errors. RefusedError for a law outside the theorem."""
 
-    def __init__(self, loop: Loop, against: Pushes, noisy: bool = False, given: bool = True) -> None:
+    def __init__(self, loop: Loop, against: Pushes, noisy: bool = False) -> None:
         words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
         if OUTSIDE in loop.words and loop.is_told(TOLD_TORQUE):
             words.append(OUTSIDE)
@@ -116,12 +117,11 @@ class Pushed:
         demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
         law = loop.loop.law
         # The law's own potential has no force beside the law's, however far from the target.
-        self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
+        self.even = law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         bounded = all(map(isfinite, against.numbers.values()))
         demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
-        self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
-        self.slow = dict[tuple[Any, ...], list[Chain]]()
+        self.afresh()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= numbers_of(loop.known.late)
@@ -135,10 +135,22 @@ class Pushed:
         self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
         slow = sqrt(self.stiffness / float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1]))
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
-        self.known, self.shared = dict[Shape, Lean](), Shared()
+        self.shared = Shared()
         wired.claim = replace(wired.claim, evidence=Told("evidence", self.evidence))
         self.wired = wired
         self.usual = [Shape(float(f"{lean * slow:.4g}")) for lean in LEANS]
+
+    def afresh(self) -> None:
+        """Begin the search."""
+        self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Shape], str]]()
+        self.slow, self.known = dict[tuple[Any, ...], list[Chain]](), dict[Shape, Lean]()
+
+    def by_another(self) -> Pushed:
+        """Return the search by a V with another potential than the law's own; it has not begun."""
+        other = copy(self)
+        other.even = False
+        other.afresh()
+        return other
 
     @cached_property
     def leans(self) -> list[Lean]:
