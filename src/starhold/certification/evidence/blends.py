@@ -13,10 +13,14 @@ from typing import Any
 from starhold.kernel.follower import Late
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.numbers import Rows, demand
+from starhold.kernel.plans import Plan
 from starhold.kernel.polynomials import Monomial, Poly
 from starhold.kernel.programs import Program
-from starhold.kernel.reading import Numbers, Told
+from starhold.kernel.reading import Claim, Numbers, Told
 from starhold.kernel.regions import Region, Tube
+from starhold.kernel.rules import Proof
+from starhold.kernel.theorems.pointing import descends
 
 
 @dataclass
@@ -60,6 +64,7 @@ class Blended(Held):
         self.known = known.parts
         self.regions = dict[tuple[Fraction, Late | None], Region]()
         self.tubes = dict[tuple[int, Late | None], tuple[Region, Tube]]()
+        self.falls = dict[tuple[int, Late | None], tuple[Tube, Any]]()
 
     def region(self, c: Fraction) -> Region:
         """Return a region that contains {V <= c}."""
@@ -77,6 +82,22 @@ class Blended(Held):
             # With the region, so that no other one gets its identity.
             self.tubes[key] = region, super().tube(region)
         return self.tubes[key][1]
+
+    def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction, Fraction]:
+        """Return how V changes in a period."""
+        key = id(tube), self.late
+        if key not in self.falls:
+            self.falls[key] = tube, super().fall(tube)
+        return self.falls[key][1]
+
+    def points(self, claim: Claim) -> Proof:
+        """The theorem `points`, in which what was found out about this motion, that of the claim, is not found out again."""
+        loop, other = AttitudeLoop(claim, remembers=True), copy(self)
+        yield from loop.sound()
+        # The claim knows what of it is read.
+        demand([p.upper for p in loop.u] == [p.upper for p in self.loop.u], "the motion is that of another loop")
+        other.loop, other.plan = loop, self.plan and Plan(loop)
+        return (yield from descends(loop, other))
 
     @cached_property
     def split(self) -> list[tuple[Fraction, Part]]:

@@ -29,7 +29,7 @@ from starhold.certification.evidence.shapes import Shape, largest_in, soft
 from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
 from starhold.certification.matrices import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled
-from starhold.kernel.held import CHANGE, Held
+from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand
 from starhold.kernel.programs import Program
@@ -97,7 +97,7 @@ class Lean(NamedTuple):
 
     shape: Shape
     V: str
-    motion: Held
+    motion: Blended
     tried: dict[Any, Falls]
 
 
@@ -297,4 +297,4 @@ class Pushed:
             loop.failed[POINTS] = "motions do not come near the target"
             return False
         claim = self.claim(chain.V, numbers, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
-        return loop.try_to_show(claim, scales)
+        return loop.try_to_show(claim, scales, self.sampled(chain.shape).motion.points)
