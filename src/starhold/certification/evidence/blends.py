@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from math import lcm
 from typing import Any
 
+from starhold.certification.evidence.squares import mixed
 from starhold.kernel.follower import Late
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
@@ -116,22 +116,11 @@ class Blended(Held):
 
     def further(self, rates: list[Poly]) -> Poly:
         """Return the derivative of V' that follows some others, V' being the first."""
-        return mixed((share, part.rate(len(rates))) for share, part in self.split)
+        return mixed(*zip(*((share, part.rate(len(rates))) for share, part in self.split), strict=True))
 
     def by_law(self, rates: list[Poly], shares: list[Fraction]) -> Poly:
         """Return the sum of shares of V' and its derivatives, with the law's torque."""
-        return mixed((c * x, part.by_law(k)) for c, part in self.split for k, x in enumerate(shares))
-
-
-def mixed(parts: Iterable[tuple[Fraction, Poly]]) -> Poly:
-    """Return the sum of polynomials times numbers, reduced to lowest terms once."""
-    factors = [(c / p.lower, p) for c, p in parts]
-    lower, upper = lcm(*(c.denominator for c, _ in factors)), dict[Monomial, int]()
-    for c, p in factors:
-        scale = c.numerator * (lower // c.denominator)
-        for m, x in p.upper.items():
-            upper[m] = upper.get(m, 0) + x * scale
-    return Poly(upper, lower)
+        return mixed(*zip(*((c * x, part.by_law(k)) for c, part in self.split for k, x in enumerate(shares)), strict=True))
 
 
 def rewired(loop: AttitudeLoop, numbers: Mapping[str, Any], V: Program | None = None) -> AttitudeLoop:

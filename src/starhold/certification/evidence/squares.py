@@ -4,12 +4,12 @@ All of them are linear in the polynomial. In floats the matrix is made as defini
 are about one; after rounding to short numbers, the residual is added to the matrix, monomial by monomial.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from itertools import combinations_with_replacement
-from math import ldexp, prod
+from math import lcm, ldexp, prod
 from typing import Any
 
 import numpy as np
@@ -263,7 +263,7 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
     shown = shared_out(problem, x, head) if all(len(z.terms) == 1 for z in problem.z) else None
     if shown is not None:
         return shown
-    rest, count = problem.p - dot(x, problem.columns), len(x)
+    rest, count = problem.p - mixed(x, problem.columns), len(x)
     A = matrix_of([*problem.columns, rest])
     echelon, rank = fmpq_mat(count, A.nrows(), [A[r, k] for k in range(count) for r in range(A.nrows())]).rref()
     kept = [next(c for c in range(A.nrows()) if echelon[r, c] != 0) for r in range(rank)]
@@ -332,7 +332,7 @@ def shared_out(problem: Problem, x: list[Fraction], head: int) -> list[Fraction]
     places: dict[Monomial, list[int]] = {}
     for k, column in enumerate(problem.columns[head:], head):
         places.setdefault(next(iter(column.terms)), []).append(k)
-    rest = problem.p - dot(x, problem.columns)
+    rest = problem.p - mixed(x, problem.columns)
     for m, c in rest.terms.items():
         places_of = places.get(m)
         if places_of is None:
@@ -358,6 +358,17 @@ def written(
     for (i, k), v in zip(problem.pairs, x[place:], strict=True):
         gram[at[i]][at[k]] = gram[at[k]][at[i]] = str(v)
     return {"multipliers": list(map(str, multipliers)), "cofactors": combined, "gram": gram}
+
+
+def mixed(factors: Iterable[Fraction], parts: Iterable[Poly]) -> Poly:
+    """Return the sum of polynomials times numbers, reduced to lowest terms once."""
+    shares = [(c / p.lower, p) for c, p in zip(factors, parts, strict=True) if c]
+    lower, upper = lcm(*(c.denominator for c, _ in shares)), dict[Monomial, int]()
+    for c, p in shares:
+        scale = c.numerator * (lower // c.denominator)
+        for m, x in p.upper.items():
+            upper[m] = upper.get(m, 0) + x * scale
+    return Poly(upper, lower)
 
 
 def text(p: Poly) -> dict[str, str]:
