@@ -19,7 +19,7 @@ def test_derivatives_of_v_are_those_that_the_kernel_makes_whatever_v_it_shares_p
         motion = pushed.sampled(shape).motion
         assert terms(motion) == terms(Held(motion.loop, motion.plan))
     # Of two moments, with the potential: each in units of a coefficient.
-    assert len(pushed.parts) == 5
+    assert len(pushed.shared.parts) == 5
 
 
 def test_v_that_rises_far_too_much_is_told_from_one_that_decreases():

@@ -33,8 +33,8 @@ def test_the_set_that_holds_a_start_keeps_the_limits_with_a_softer_potential_alo
     kept = []
     for shape in (*pushed.usual, *soft(pushed.sampled(pushed.usual[0]).motion, limits, ANGLE, RATE, ())):
         chain = pushed.chain(shape, ANGLE, RATE)
-        claim = pushed.claim(chain.V, pushed.beginning(ANGLE, RATE, limits) | chain.of_level())
-        kept.append(begins(pushed.loop, claim, chain.scales))
+        numbers = pushed.beginning(ANGLE, RATE, limits) | chain.of_level()
+        kept.append(begins(pushed.loop, chain.motion, numbers, chain.scales))
     assert kept[: len(pushed.usual)] == [False] * len(pushed.usual)
     assert any(kept)
     [chosen] = pushed.begun(ANGLE, RATE, limits)

@@ -59,7 +59,7 @@ class Held(Follower):
     """A loop with its torque held for a period, and V = s (1 - q0) + x.Gx."""
 
     def __init__(self, loop: AttitudeLoop, plan: Plan | None = None) -> None:
-        numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
+        numbers, x = loop.claim.numbers, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
         self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
         # What noise adds near the target, and what momentum adds to that.
@@ -102,8 +102,7 @@ class Held(Follower):
         self.more = growing(commanded)
         left = [p + q for p, q in zip(minus(commanded, self.more), minus(self.beside, turning), strict=True)]
         # Of the rest, momentum times the target's rate is slow, and other terms are bounded by their first external factor.
-        self.slow = [with_momentum(p, "r") for p in left]
-        self.leaning = [with_momentum(p, "r") for p in minus(self.beside, turning)]
+        self.slow, self.leaning = ([with_momentum(p, "r") for p in of] for of in (left, minus(self.beside, turning)))
         self.rigid = {x: [first(p, x) for p in minus(left, self.slow)] for x in ("e", "a", "h", "r")}
         self.near = near_target(loop, self.h)
         self.N, h = inverse(loop.given), self.h
@@ -111,20 +110,17 @@ class Held(Follower):
         demand(self.off * self.light < 1, "the inertia is known too badly")
         # The size of the slow torque, and how far a lasting torque, and this one, turns the body.
         self.lasting = felt(self.slow, "h", self.others) * self.size("h")
-        stiff = [[-x for x in row[TURN]] for row in self.near.torque]
-        self.soft = stretch(inverse(stiff)) if self.lasting else Fraction(0)
+        self.soft = stretch(inverse([[-x for x in row[TURN]] for row in self.near.torque])) if self.lasting else ZERO
         self.leant: Radii = Fraction(0), self.soft * self.lasting
         self.gyroscopic = [-p - q for p, q in zip(free, turning, strict=True)]
         self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
         self.bend = apply(self.N, self.gyroscopic)
         self.bent = [[p.slope(name) for name in STATE[RATE]] for p in self.bend]
-        self.rate = loop.slopes_along(V, self.accelerated)
         self.commanded = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
         # The law's torque minus its linear part near the target.
         on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
-        self.heeded = [with_momentum(p) for p in loop.u]
+        self.heeded, self.spun = ([with_momentum(p) for p in of] for of in (loop.u, self.gyroscopic))
         self.unlike = [p.at(on) for p in minus(minus(loop.u, linear), self.heeded)]
-        self.spun = [with_momentum(p) for p in self.gyroscopic]
         self.tumbled = minus(self.gyroscopic, self.spun)
         # What wheels' momentum adds per unit of rate, as far as the law's torque does not cancel it.
         self.turning = [with_momentum(p - g) for p, g in zip(self.more, self.gyroscopic, strict=True)]
@@ -134,9 +130,20 @@ class Held(Follower):
         self.speeding = [(p - g - rate).at(on) for p, g, rate in zip(self.pull, self.bend, rates, strict=True)]
         parts = zip(self.u, self.more, linear, self.gyroscopic, self.turning, strict=True)
         self.left = [(p + more - near - g - turning).at(on) for p, more, near, g, turning in parts]
+        self.parted = minus(self.beside, turning), turning
+        self.late = self.follow(numbers)
+        # The effects of torques at the beginning and at the end of a period, half of each if held, and those of turns.
+        ways = [[[c * x for x in row] for c in (h / 2, turn) for row in self.N] for turn in (h * h / 4, ZERO)]
+        ways.append(scalar(0) + scalar(1))
+        self.ways = [rows + [[ZERO] * 3] * (len(self.near.A) - len(STATE)) for rows in ways]
+        self.measure(loop)
+
+    def measure(self, loop: AttitudeLoop) -> None:
+        """Take V from a loop that is otherwise the same."""
+        self.loop, x, on = loop, [var(name) for name in STATE], {"q0": 1 - var("v")}
+        self.rate = loop.slopes_along(loop.lyapunov, self.accelerated)
         steep = [self.rate.slope(name).at(self.commanded).at(on) for name in STATE[RATE]]
-        bent = ("q0", *STATE, *MOMENTA)
-        self.curvature = {name: [self.rate.slope(name).slope(other) for other in bent] for name in STATE[RATE]}
+        self.curvature = {x: [self.rate.slope(x).slope(y) for y in ("q0", *STATE, *MOMENTA)] for x in STATE[RATE]}
         at = dict.fromkeys((*STATE, "v", *self.others), 0)
         self.steepness = [[p.slope(name).at(at).number for name in STATE] for p in steep]
         self.steep = minus(steep, apply(self.steepness, x))
@@ -145,13 +152,7 @@ class Held(Follower):
         self.even = self.s == 0
         # The effect of a torque on V: felt x.
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
-        self.parted = minus(self.beside, turning), turning
         self.worked = [[dot(apply(self.felt, x), parts)] for parts in self.parted]
-        self.late = self.follow(numbers)
-        # The effects of torques at the beginning and at the end of a period, half of each if held, and those of turns.
-        ways = [[[c * x for x in row] for c in (h / 2, turn) for row in self.N] for turn in (h * h / 4, ZERO)]
-        ways.append(scalar(0) + scalar(1))
-        self.ways = [rows + [[ZERO] * 3] * (len(self.near.A) - len(STATE)) for rows in ways]
         # 2 (1 - q0) >= |q|^2.
         self.under = self.form(self.s / 2)
         demand(definite(self.under), "V is not least on target")
@@ -166,7 +167,7 @@ class Held(Follower):
         """Return the mean of -V' over a period without disturbances, up to a derivative of V', then that derivative, and its
         share in the mean: the law's torque is held, and wheels' momentum turns against the body."""
         rates, shares = [self.rate], [Fraction(1)]
-        while len(rates) < ORDER and len(rates[-1].terms) < LONG:
+        while len(rates) < ORDER and len(rates[-1].upper) < LONG:
             rates.append(self.further(rates))
             shares.append(shares[-1] * self.h / len(rates))
         return factored(-self.by_law(rates, shares)), rates[-1], shares[-1] * self.h / (len(rates) + 1)

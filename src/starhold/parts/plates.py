@@ -142,9 +142,10 @@ def largest_torque(
         faces = n[seen]
         M = first[seen].T @ faces
         low, _, high = np.linalg.eigvalsh(M + M.T) / 2.0
-        arms = [float(np.linalg.norm(M - (low + (high - low) * k / 32.0) * np.eye(3), 2)) for k in range(33)]
+        shifts = low + (high - low) * np.arange(33) / 32.0
+        arms = np.linalg.norm(M - shifts[:, None, None] * np.eye(3), 2, axis=(1, 2))
         others = np.linalg.norm(third[seen].T @ faces, 2) + np.linalg.norm(second[seen].T @ squares[seen], 2)
-        largest = max(largest, float(min(arms) + others))
+        largest = max(largest, float(arms.min() + others))
     # Slightly more, because plates seen nearly edge-on may count as hidden.
     return largest + TOLERANCE * float(sum(np.linalg.norm(arms, axis=1).sum() for arms in (first, second, third)))
 

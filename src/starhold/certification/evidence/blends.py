@@ -1,17 +1,34 @@
-"""The derivatives of V along a loop with its torque held, as sums of those of V's parts."""
+"""What motions of one loop with different V share: the derivatives of V's parts, and all that does not depend on V."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
+from starhold.certification.evidence.squares import mixed
+from starhold.kernel.follower import Late
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.numbers import Rows, demand
 from starhold.kernel.plans import Plan
-from starhold.kernel.polynomials import Monomial, Poly, dot
+from starhold.kernel.polynomials import Monomial, Poly
+from starhold.kernel.programs import Program
+from starhold.kernel.reading import Claim, Numbers, Told
+from starhold.kernel.regions import Region, Tube
+from starhold.kernel.rules import Proof
+from starhold.kernel.theorems.pointing import descends
 
-Parts = dict[tuple[tuple[Monomial, Fraction], ...], "Part"]
-"""Parts of V by their terms, in units of the first coefficient."""
+
+@dataclass
+class Shared:
+    """Parts of V by their terms, in units of the first coefficient, and a motion's attributes."""
+
+    parts: dict[tuple[tuple[Monomial, Fraction], ...], Part] = field(default_factory=dict[Any, "Part"])
+    motion: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 class Part:
@@ -35,11 +52,52 @@ class Part:
 
 class Blended(Held):
     """A loop with its torque held, and a V that is a sum of parts. They are kept in `known`, as another V of the same loop
-    has the same ones in other shares."""
+    has the same ones in other shares; so is all that does not depend on V. Regions and tubes are asked for repeatedly."""
 
-    def __init__(self, loop: AttitudeLoop, plan: Plan | None, known: Parts) -> None:
-        super().__init__(loop, plan)
-        self.known = known
+    def __init__(self, loop: AttitudeLoop, known: Shared) -> None:
+        if known.motion:
+            vars(self).update(known.motion)
+            self.measure(loop)
+        else:
+            super().__init__(loop)
+            known.motion.update(vars(self))
+        self.known = known.parts
+        self.regions = dict[tuple[Fraction, Late | None, Fraction | None], Region]()
+        self.tubes = dict[tuple[int, Late | None, Fraction | None], tuple[Region, Tube]]()
+        self.falls = dict[tuple[int, Late | None, Fraction | None], tuple[Tube, Any]]()
+
+    def region(self, c: Fraction) -> Region:
+        """Return a region that contains {V <= c}."""
+        key = c, self.late, self.kinetic
+        if key not in self.regions:
+            self.regions[key] = super().region(c)
+        return self.regions[key]
+
+    def tube(self, region: Region, amiss: list[Fraction] | None = None) -> Tube:
+        """Return a set that motions from a region do not leave for a period."""
+        if amiss is not None:
+            return super().tube(region, amiss)
+        key = id(region), self.late, self.kinetic
+        if key not in self.tubes:
+            # With the region, so that no other one gets its identity.
+            self.tubes[key] = region, super().tube(region)
+        return self.tubes[key][1]
+
+    def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction, Fraction]:
+        """Return how V changes in a period."""
+        key = id(tube), self.late, self.kinetic
+        if key not in self.falls:
+            self.falls[key] = tube, super().fall(tube)
+        return self.falls[key][1]
+
+    def points(self, claim: Claim) -> Proof:
+        """The theorem `points`, in which what was found out about this motion, that of the claim, is not found out again."""
+        loop, other = AttitudeLoop(claim, remembers=True), copy(self)
+        yield from loop.sound()
+        # The claim knows what of it is read.
+        demand([p.upper for p in loop.u] == [p.upper for p in self.loop.u], "the motion is that of another loop")
+        other.loop, other.plan = loop, self.plan and Plan(loop)
+        return (yield from descends(loop, other))
 
     @cached_property
     def split(self) -> list[tuple[Fraction, Part]]:
@@ -58,8 +116,28 @@ class Blended(Held):
 
     def further(self, rates: list[Poly]) -> Poly:
         """Return the derivative of V' that follows some others, V' being the first."""
-        return dot(*zip(*((share, part.rate(len(rates))) for share, part in self.split), strict=True))
+        return mixed(*zip(*((share, part.rate(len(rates))) for share, part in self.split), strict=True))
 
     def by_law(self, rates: list[Poly], shares: list[Fraction]) -> Poly:
         """Return the sum of shares of V' and its derivatives, with the law's torque."""
-        return dot(*zip(*((c * x, part.by_law(k)) for c, part in self.split for k, x in enumerate(shares)), strict=True))
+        return mixed(*zip(*((c * x, part.by_law(k)) for c, part in self.split for k, x in enumerate(shares)), strict=True))
+
+
+def rewired(loop: AttitudeLoop, numbers: Mapping[str, Any], V: Program | None = None) -> AttitudeLoop:
+    """Return a loop with other numbers in its claim, and maybe another V, without wiring it again."""
+    other, claim = copy(loop), replace(loop.claim, numbers=Numbers("numbers", {k: Fraction(x) for k, x in numbers.items()}))
+    if V is not None:
+        claim = replace(claim, programs=Told("programs", claim.programs.content | {"lyapunov": V}))
+        vars(other).pop("lyapunov", None)
+    other.claim = claim
+    return other
+
+
+def renumbered(motion: Held, numbers: Mapping[str, Any]) -> Held:
+    """Return a motion with other numbers in its claim, which do not change the motion."""
+    other = copy(motion)
+    other.loop = rewired(motion.loop, numbers)
+    if motion.plan is not None:
+        other.plan = copy(motion.plan)
+        other.plan.loop = other.loop
+    return other

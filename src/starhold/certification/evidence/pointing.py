@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
+from copy import copy
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
@@ -16,7 +18,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.blends import Blended, Parts
+from starhold.certification.evidence.blends import Blended, Shared, rewired
 from starhold.certification.evidence.chains import Chain, Falls
 from starhold.certification.evidence.ellipsoids import MORE
 from starhold.certification.evidence.finding import read
@@ -29,10 +31,11 @@ from starhold.certification.evidence.slow import slowed
 from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
 from starhold.certification.matrices import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled
-from starhold.kernel.held import CHANGE, KINETIC, Held
+from starhold.kernel.held import CHANGE, KINETIC
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand
-from starhold.kernel.plans import Plan
+from starhold.kernel.programs import Program
+from starhold.kernel.reading import Told
 from starhold.kernel.theorems.noise import SHARE
 from starhold.parts.craft import tensor
 
@@ -87,7 +90,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
 def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pushed]:
     """Return the searches by the law's own even V and by another, that of the larger start first."""
     first = Pushed(loop, against, noisy)
-    both = [first, Pushed(loop, against, noisy, given=False)] if first.even else [first]
+    both = [first, first.by_another()] if first.even else [first]
     angle, rate = both[-1].start(*begin) if first.even else (0.0, 0.0)
     return both if not angle or first.may_begin(angle, rate, begin[2]) else both[::-1]
 
@@ -97,14 +100,14 @@ class Lean(NamedTuple):
 
     shape: Shape
     V: str
-    motion: Held
+    motion: Blended
     tried: dict[Any, Falls]
 
 
 class Pushed:
     """A loop under unmodelled torques and errors. RefusedError for a law outside the theorem."""
 
-    def __init__(self, loop: Loop, against: Pushes, noisy: bool = False, given: bool = True) -> None:
+    def __init__(self, loop: Loop, against: Pushes, noisy: bool = False) -> None:
         words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
         if OUTSIDE in loop.words and loop.is_told(TOLD_TORQUE):
             words.append(OUTSIDE)
@@ -117,13 +120,11 @@ class Pushed:
         demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
         law = loop.loop.law
         # The law's own potential has no force beside the law's, however far from the target.
-        self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
+        self.even = law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         bounded = all(map(isfinite, against.numbers.values()))
         demand(bounded, "the wheels' friction has no bound, because their momentum has no limit")
-        self.plan: Plan | None = None
-        self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Start], str]]()
-        self.slow = dict[tuple[Any, ...], list[Chain]]()
+        self.afresh()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= numbers_of(loop.known.late)
@@ -137,8 +138,22 @@ class Pushed:
         self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
         slow = sqrt(self.stiffness / float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1]))
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
-        self.known, self.parts = dict[Shape, Lean](), Parts()
+        self.shared = Shared()
+        wired.claim = replace(wired.claim, evidence=Told("evidence", self.evidence))
+        self.wired = wired
         self.usual = [Shape(float(f"{lean * slow:.4g}")) for lean in LEANS]
+
+    def afresh(self) -> None:
+        """Begin the search."""
+        self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Start], str]]()
+        self.slow, self.known = dict[tuple[Any, ...], list[Chain]](), dict[Shape, Lean]()
+
+    def by_another(self) -> Pushed:
+        """Return the search by a V with another potential than the law's own; it has not begun."""
+        other = copy(self)
+        other.even = False
+        other.afresh()
+        return other
 
     @cached_property
     def leans(self) -> list[Lean]:
@@ -151,9 +166,7 @@ class Pushed:
         if shape not in self.known:
             s = None if self.even else self.stiffness
             V = self.loop.crossed(s, shape.epsilon) if shape in self.usual else self.loop.softened(s, shape)
-            wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
-            motion = Blended(wired, self.plan, self.parts)
-            self.plan = motion.plan
+            motion = Blended(rewired(self.wired, self.numbers, Program.read(self.loop.by_digest[V])), self.shared)
             if self.radii:
                 motion.sways(self.radii)
             motion.late = weighed(motion, self.scales)
@@ -231,7 +244,7 @@ class Pushed:
             tried += 1
             if not first.decreases(noticeably=bool(limits)):
                 slow.append(first)
-            elif begins(loop, self.claim(first.V, numbers | first.of_level()), first.scales):
+            elif begins(loop, first.motion, numbers | first.of_level(), first.scales):
                 return together or [first]
         if len(slow) == tried:
             self.slow[angle, rate, *limits.items()] = slow
@@ -291,4 +304,4 @@ class Pushed:
             loop.failed[POINTS] = "motions do not come near the target"
             return False
         claim = self.claim(chain.V, numbers, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
-        return loop.try_to_show(claim, scales)
+        return loop.try_to_show(claim, scales, self.sampled(chain.shape).motion.points)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot, scale
 from starhold.certification.appendages import appendages, appended_motion
-from starhold.certification.evidence.finding import NotFoundError, by_digests, complete, read, unproved
+from starhold.certification.evidence.finding import NotFoundError, Theorem, by_digests, complete, read, unproved
 from starhold.certification.evidence.shapes import Shape
 from starhold.certification.matrices import above
 from starhold.certification.measured import driven_errors
@@ -264,10 +264,10 @@ class RecordedLoop:
         law = self.roles["law"]
         return any(one.startswith(f"{name}.") for one in Program.read(self.by_digest[law]).inputs)
 
-    def try_to_show(self, claim: dict[str, Any], scales: Mapping[str, float]) -> bool:
-        """Add a claim if evidence for it is found."""
+    def try_to_show(self, claim: dict[str, Any], scales: Mapping[str, float], theorem: Theorem | None = None) -> bool:
+        """Add a claim if evidence for it is found. theorem: what yields its obligations sooner."""
         try:
-            self.claims.append(complete(claim, self.by_digest, scales))
+            self.claims.append(complete(claim, self.by_digest, scales, theorem))
         except NotFoundError as reason:
             self.failed[claim["theorem"]] = str(reason)
             return False

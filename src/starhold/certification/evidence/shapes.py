@@ -92,7 +92,8 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float, others
     least softened ones, and of them the most definite; and others, if theirs does so. Those that decrease fastest near the
     target come first. motion: with the potential as it is."""
     J, torque = floats(motion.loop.given), floats(motion.near.torque)
-    potential, loads = floats(motion.form(motion.s / 2))[TURN, TURN], shares(motion, limits) @ torque
+    potential, used_by = floats(motion.form(motion.s / 2))[TURN, TURN], shares(motion, limits)
+    loads = used_by @ torque
     stiff, moment = float(np.linalg.eigvalsh(potential)[-1]), float(np.trace(J)) / 3.0
     slow, inner = (stiff / float(np.linalg.eigvalsh(J)[-1])) ** 0.5, floats(inverse(motion.loop.given))
     shapes = [
@@ -123,12 +124,13 @@ def soft(motion: Held, limits: dict[str, Any], angle: float, rate: float, others
         fit &= about | (softness == softness[fit].max(initial=0.0))
         if fit.any():
             chosen.add(int(np.argmax(np.where(fit, margins, -np.inf))))
-    return [shapes[k] for k in sorted(chosen, key=lambda k: -paces[k]) if not asks_more(motion, P[k], level[k], limits)]
+    longest, ordered = limits.get("limit.norm", inf), sorted(chosen, key=lambda k: -paces[k])
+    return [shapes[k] for k in ordered if not asks_more(motion, P[k], level[k], used_by, longest)]
 
 
-def asks_more(motion: Held, P: Array, level: float, limits: dict[str, Any]) -> bool:
-    """Return whether the law commands more than its limits at some state of {V <= level} and of what is around it. P:
-    the matrix of V near the target."""
+def asks_more(motion: Held, P: Array, level: float, used_by: Array, longest: float) -> bool:
+    """Return whether the law commands more than its limits at some state of {V <= level} and of what is around it. P: the
+    matrix of V near the target; used_by: the result of `shares`; longest: the limit of the torque's norm."""
     r = np.random.default_rng(1)
     along, axes, *around = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2 + len(AROUND), 3, STATES)))
     half = r.uniform(0.0, pi, STATES)
@@ -144,6 +146,6 @@ def asks_more(motion: Held, P: Array, level: float, limits: dict[str, Any]) -> b
     rows = [(f"{letter}{k + 1}", v) for letter, one in zip(AROUND, around, strict=True) for k, v in enumerate(one)]
     x |= {name: float(motion.others[name]) * v for name, v in rows if name in motion.others}
     u = np.array([valued(p, x) + np.zeros(STATES) for p in motion.loop.u])
-    used = np.abs(shares(motion, limits) @ u).max(axis=0, initial=0.0)
-    used = np.maximum(used, np.linalg.norm(u, axis=0) / limits.get("limit.norm", inf))
+    used = np.abs(used_by @ u).max(axis=0, initial=0.0)
+    used = np.maximum(used, np.linalg.norm(u, axis=0) / longest)
     return bool(used[inside].max(initial=0.0) > 1.0)

@@ -4,12 +4,12 @@ All of them are linear in the polynomial. In floats the matrix is made as defini
 are about one; after rounding to short numbers, the residual is added to the matrix, monomial by monomial.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from itertools import combinations_with_replacement
-from math import ldexp
+from math import lcm, ldexp, prod
 from typing import Any
 
 import numpy as np
@@ -107,9 +107,9 @@ def settled(o: Squares) -> tuple[Poly, list[Poly], dict[int, Fraction]]:
     names, p, fixed = {name for z in o.z for name in z.names}, o.p, dict[int, Fraction]()
     known = [*o.strict, *o.known]
     for place, g in enumerate(known):
-        strange = next((m for m in g.terms if not names.issuperset(m)), None)
+        strange = next((m for m in g.upper if not names.issuperset(m)), None)
         if strange is not None:
-            fixed[place] = max(p.terms.get(strange, Fraction(0)) / g.terms[strange], Fraction(0))
+            fixed[place] = max(Fraction(p.upper.get(strange, 0) * g.lower, p.lower * g.upper[strange]), Fraction(0))
             p = p - g * fixed[place]
     return p, [g for place, g in enumerate(known) if place not in fixed], fixed
 
@@ -155,38 +155,39 @@ def posed(p: Poly, known: list[Poly], others: list[Poly], z: Sequence[Poly]) -> 
 
 def products(z: Sequence[Poly]) -> tuple[list[tuple[int, int]], list[Poly]]:
     """Return the indices of a Gram matrix's upper triangle, and the products that its entries multiply."""
-    return _products(tuple(tuple(sorted(p.terms.items())) for p in z))
+    return _products(tuple((p.lower, *sorted(p.upper.items())) for p in z))
 
 
 @cache
-def _products(z: tuple[tuple[tuple[Monomial, Fraction], ...], ...]) -> tuple[list[tuple[int, int]], list[Poly]]:
-    parts, pairs = [Poly(dict(terms)) for terms in z], [(i, k) for k in range(len(z)) for i in range(k + 1)]
+def _products(z: tuple[tuple[Any, ...], ...]) -> tuple[list[tuple[int, int]], list[Poly]]:
+    parts, pairs = [Poly(dict(terms), lower) for lower, *terms in z], [(i, k) for k in range(len(z)) for i in range(k + 1)]
     return pairs, [parts[i] * parts[k] * (1 if i == k else 2) for i, k in pairs]
 
 
 def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly] = ()) -> tuple[Entries, Any, Any]:
     """Return the linear equations in floats, a row for each monomial in scaled variables, and the columns' scales."""
     columns = [*problem.columns, *more]
-    rows = {m: k for k, m in enumerate(sorted({m for q in (problem.p, *columns) for m in q.terms}))}
+    rows = {m: k for k, m in enumerate(sorted({m for q in (problem.p, *columns) for m in q.upper}))}
 
     @cache
     def size(m: Monomial) -> float:
-        return float(np.prod([scales.get(name, 1.0) for name in m]))
+        return float(prod(scales.get(name, 1.0) for name in m))
 
-    entries = [(rows[m], k, float(c) * size(m)) for k, q in enumerate(columns) for m, c in q.terms.items()]
+    # A quotient of integers is rounded once, as a float of a fraction is.
+    entries = [(rows[m], k, c / q.lower * size(m)) for k, q in enumerate(columns) for m, c in q.upper.items()]
     largest = np.zeros(len(columns))
     for _, k, c in entries:
         largest[k] = max(largest[k], abs(c))
     # Rows and columns of the matrix are scaled alike, or it would not stay definite.
-    sizes = [max(abs(float(c)) * size(m) for m, c in z.terms.items()) for z in problem.z]
+    sizes = [max(abs(c / z.lower) * size(m) for m, c in z.upper.items()) for z in problem.z]
     head = len(problem.columns) - len(problem.pairs)
     for k, (i, j) in enumerate(problem.pairs, head):
         largest[k] = sizes[i] * sizes[j] * (1.0 if i == j else 2.0)
     places = [r for r, _, _ in entries], [k for _, k, _ in entries]
     A = Entries(*places, [c / largest[k] for _, k, c in entries], (len(rows), len(columns)))
     b = np.zeros(len(rows))
-    for m, c in problem.p.terms.items():
-        b[rows[m]] = float(c) * size(m)
+    for m, c in problem.p.upper.items():
+        b[rows[m]] = c / problem.p.lower * size(m)
     return A, b, largest
 
 
@@ -262,7 +263,7 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
     shown = shared_out(problem, x, head) if all(len(z.terms) == 1 for z in problem.z) else None
     if shown is not None:
         return shown
-    rest, count = problem.p - dot(x, problem.columns), len(x)
+    rest, count = problem.p - mixed(x, problem.columns), len(x)
     A = matrix_of([*problem.columns, rest])
     echelon, rank = fmpq_mat(count, A.nrows(), [A[r, k] for k in range(count) for r in range(A.nrows())]).rref()
     kept = [next(c for c in range(A.nrows()) if echelon[r, c] != 0) for r in range(rank)]
@@ -331,7 +332,7 @@ def shared_out(problem: Problem, x: list[Fraction], head: int) -> list[Fraction]
     places: dict[Monomial, list[int]] = {}
     for k, column in enumerate(problem.columns[head:], head):
         places.setdefault(next(iter(column.terms)), []).append(k)
-    rest = problem.p - dot(x, problem.columns)
+    rest = problem.p - mixed(x, problem.columns)
     for m, c in rest.terms.items():
         places_of = places.get(m)
         if places_of is None:
@@ -357,6 +358,17 @@ def written(
     for (i, k), v in zip(problem.pairs, x[place:], strict=True):
         gram[at[i]][at[k]] = gram[at[k]][at[i]] = str(v)
     return {"multipliers": list(map(str, multipliers)), "cofactors": combined, "gram": gram}
+
+
+def mixed(factors: Iterable[Fraction], parts: Iterable[Poly]) -> Poly:
+    """Return the sum of polynomials times numbers, reduced to lowest terms once."""
+    shares = [(c / p.lower, p) for c, p in zip(factors, parts, strict=True) if c]
+    lower, upper = lcm(*(c.denominator for c, _ in shares)), dict[Monomial, int]()
+    for c, p in shares:
+        scale = c.numerator * (lower // c.denominator)
+        for m, x in p.upper.items():
+            upper[m] = upper.get(m, 0) + x * scale
+    return Poly(upper, lower)
 
 
 def text(p: Poly) -> dict[str, str]:

@@ -11,15 +11,17 @@ from numpy.typing import NDArray
 
 from starhold.certification.assumptions import as_it_starts
 from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.blends import renumbered
 from starhold.certification.evidence.cones import interior_point
-from starhold.certification.evidence.finding import NotFoundError, evidence, read
+from starhold.certification.evidence.finding import NotFoundError, evidence
 from starhold.certification.evidence.sparse import entries_of
 from starhold.certification.evidence.squares import DEFINITE, cofactors, equations, free, posed, settled
+from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.rules import Squares
-from starhold.kernel.theorems.pointing import points
+from starhold.kernel.theorems.pointing import descends
 from starhold.loop.closed_loop import ClosedLoop
 
 Array = NDArray[np.float64]
@@ -31,14 +33,15 @@ def start_rate(loop: ClosedLoop) -> float:
     return float(np.linalg.norm(as_it_starts(loop).rate))
 
 
-def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
-    """Return whether the set of a claim without levels is sound, and the torque keeps its limits on it, as far as floats
-    tell."""
+def begins(loop: Loop, motion: Held, numbers: Mapping[str, Any], scales: Mapping[str, float]) -> bool:
+    """Return whether the set of a claim with these numbers, but without levels, is sound, and the torque keeps its limits on
+    it, as far as floats tell."""
+    tried = list[Array]()
     try:
-        shown = points(read(claim | {"numbers": claim["numbers"] | {"highest": "0"}}, loop.by_digest))
-        wanted = dict(takewhile(lambda one: one[0] != "V between samples", shown))
+        begun = renumbered(motion, {**numbers, "highest": 0})
+        wanted = dict(takewhile(lambda one: one[0] != "V between samples", descends(begun.loop, begun)))
         for name, o in wanted.items():
-            chance = likely(o, scales) if isinstance(o, Squares) else None
+            chance = likely(o, scales, tried) if isinstance(o, Squares) else None
             if chance is None:
                 evidence(name, wanted, scales)
             elif chance < DEFINITE:
@@ -54,35 +57,50 @@ def feedback(loop: AttitudeLoop) -> float:
     return -float(sum(row[3 + k] for k, row in enumerate(near_target(loop, Fraction(0)).torque))) / 3.0
 
 
-def likely(o: Squares, scales: Mapping[str, float]) -> float | None:
-    """Return by how much the matrix of a sum of squares can be definite, in floats, where each of its entries has a monomial
-    of its own: it follows from multipliers and cofactors, and the interior point looks for these few alone. None otherwise.
-    """
+def likely(o: Squares, scales: Mapping[str, float], tried: list[Array]) -> float | None:
+    """Return by how much, at least, the matrix of a sum of squares can be definite, in floats, where each of its entries has
+    a monomial of its own: it follows from multipliers and cofactors, and the interior point looks for these few alone. None
+    otherwise. tried: those of similar sums, which often do, and to which those found are added."""
     p, known, _ = settled(o)
     others = [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, len(o.z)), strict=True) for c in parts]
     z = o.z if o.least else free([p, *known, *others], o.z)
     problem = posed(p, known, others, z)
     entries, b, _ = equations(problem, scales)
-    A = entries.scipy()
-    head, count = A.shape[1] - len(problem.pairs), len(problem.pairs)
-    grams = A[:, head:]
-    places: list[int] = list(grams.indices)
+    head, count = entries.shape[1] - len(problem.pairs), len(problem.pairs)
+    A, grams = np.zeros((len(b), head)), list[tuple[int, float]]()
+    for row, column, value in zip(*entries[:3], strict=True):
+        if column < head:
+            A[row, column] = value
+        else:
+            grams.append((row, value))
+    places = [row for row, _ in grams]
     if not len(places) == len(set(places)) == count:
         return None
     # In triangles of matrices, the entries beside the diagonal twice.
-    weights = np.array([1.0 if i == k else 0.5**0.5 for i, k in problem.pairs]) / grams.data
+    halves = np.array([1.0 if i == k else 0.5**0.5 for i, k in problem.pairs])
+    weights = halves / np.array([value for _, value in grams])
     unit, equal = float(np.abs(b).max()) or 1.0, sorted(set(range(len(b))) - set(places))
     square, strict = (
         [[float(i == k)] for i, k in problem.pairs],
         [[float(k < problem.strict)] for k in range(problem.signed)],
     )
     rows: list[Array] = [
-        np.hstack([A[equal, :head].toarray(), np.zeros((len(equal), 1))]),
+        np.hstack([A[equal], np.zeros((len(equal), 1))]),
         np.hstack([-np.eye(problem.signed, head), np.array(strict).reshape(-1, 1)]),
         np.eye(head + 1)[head:],
-        np.hstack([A[places, :head].toarray() * weights[:, None], np.array(square)]),
+        np.hstack([A[places] * weights[:, None], np.array(square)]),
     ]
     right = np.concatenate([b[equal] / unit, np.zeros(problem.signed), np.ones(1), b[places] * weights / unit])
+    for x in tried if not equal else ():
+        if len(x) == head and x[: problem.signed].min(initial=0.0) >= 0.0:
+            M = np.zeros((len(z), len(z)))
+            M[tuple(zip(*problem.pairs, strict=True))] = (right[-count:] - rows[-1][:, :-1] @ x) * halves
+            least = float(np.linalg.eigvalsh(M, "U")[0])
+            if least > 0.0:
+                return least
     cost = -np.eye(head + 1)[head]
     x = interior_point(cost, entries_of(np.vstack(rows)), right, len(equal), problem.signed + 1, [len(z)])
-    return None if x is None else float(x[-1])
+    if x is None:
+        return None
+    tried.append(x[:-1])
+    return float(x[-1])

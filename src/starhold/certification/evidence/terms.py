@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
+from functools import reduce
 from importlib import import_module
 from itertools import combinations, combinations_with_replacement
 from typing import Any
@@ -58,7 +59,7 @@ def valued(p: Poly, at: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64
     """Return a polynomial in floats, of many states at once."""
     values = np.zeros(np.broadcast_shapes(*(x.shape for x in at.values())))
     for m, c in p.terms.items():
-        values = values + float(c) * np.prod([at[name] for name in m], axis=0)
+        values = values + float(c) * reduce(np.multiply, [at[name] for name in m], 1.0)
     return values
 
 

@@ -65,7 +65,12 @@ def points(claim: Claim) -> Proof:
     """
     loop = AttitudeLoop(claim, remembers=True)
     yield from loop.sound()
-    motion, numbers, samples = Held(loop), claim.numbers, 0
+    return (yield from descends(loop, Held(loop)))
+
+
+def descends(loop: AttitudeLoop, motion: Held) -> Proof:
+    """The theorem `points` for a loop whose body is the one of the equations."""
+    claim, numbers, samples = loop.claim, loop.claim.numbers, 0
     c, h = numbers["level"], motion.h
     starts = [numbers.get(name) or Fraction(0) for name in ("angle", "start.angle")]
     demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")

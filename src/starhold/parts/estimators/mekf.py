@@ -11,10 +11,24 @@ import numpy as np
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import NO_TURN, Quaternion
-from starhold.algebra.scalar import Scalar, both, either, less, less_equal, maximum, where
+from starhold.algebra.scalar import Scalar, Truth, both, either, less, less_equal, maximum, where
 from starhold.algebra.structure import chosen
-from starhold.algebra.structured import when
-from starhold.algebra.vector import ZERO, Matrix, Vector, add, along_axis, apply, diagonal, inverse, most, scale, subtract
+from starhold.algebra.structured import repeat, until, when
+from starhold.algebra.vector import (
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Vector,
+    add,
+    along_axis,
+    apply,
+    combine,
+    diagonal,
+    inverse,
+    most,
+    scale,
+    subtract,
+)
 from starhold.algebra.vector import multiply as product
 from starhold.parts import vectors
 from starhold.parts.attitudes import attitudes_of, together
@@ -274,18 +288,41 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
 @cache
 def settled(params: Numbers, every: int, rate: Vector, period: float) -> Gains | None:
     """Return the gains after many new attitudes at a constant rate; None if they do not converge."""
-    memory, before = remember(params, None)._replace(rate=rate), np.zeros((4, 3, 3))
-    for _ in range(MOST // every):
-        for _ in range(every - 1):
-            memory = arrived(propagated(memory, rate, params, period), params).memory
-        now = arrived(propagated(memory, rate, params, period), params)
-        by = correction(now, [(now.attitude, True)], [], params)
-        gain, memory = by.gain, corrected(now, by, params, period).memory
-        change, size = (np.abs(np.array(x)).max(axis=(1, 2)) for x in (np.subtract(gain, before), gain))
-        if (change <= 1e-9 * size).all():
-            return gain
-        before = gain
-    return None
+    memory, none = remember(params, None)._replace(rate=rate), (ZERO, ZERO, ZERO)
+    begun, gain = Instant(memory.attitude, memory.turn, ZERO, memory), Gains(none, none, none, none)
+    other = Gains(IDENTITY, IDENTITY, IDENTITY, IDENTITY)
+    _, gain, before = _settling(every, len(params.weights))(begun, gain, other, rate, params, period)
+    change, size = (np.abs(np.array(x)).max(axis=(1, 2)) for x in (np.subtract(gain, before), gain))
+    return gain if (change <= 1e-9 * size).all() else None
+
+
+@cache
+def _settling(every: int, trackers: int) -> Any:
+    """Return in machine code, because it takes thousands of steps, what goes on from an instant and two different gains to
+    the last two gains."""
+    from starhold.trace.calling import Compiled
+
+    def find(begun: Instant, gain: Gains, before: Gains, rate: Vector, params: Numbers, period: Scalar) -> Any:
+        def turn(_: int, now: Instant) -> tuple[Instant]:
+            return (arrived(propagated(now.memory, rate, params, period), params),)
+
+        def cycle(now: Instant, gain: Gains, _: Gains) -> tuple[Instant, Gains, Gains]:
+            (now,) = repeat(every, turn, now)
+            by = correction(now, [(now.attitude, True)], [], params)
+            return corrected(now, by, params, period), by.gain, gain
+
+        def done(_: Instant, gain: Gains, before: Gains) -> Truth:
+            return reduce(both, map(alike, gain, before))
+
+        return until(done, cycle, begun, gain, before, at_most=MOST // every)
+
+    def alike(a: Matrix, b: Matrix) -> Truth:
+        change, size = (most((*x, *y, *z)) for x, y, z in (combine(1.0, a, -1.0, b), a))
+        return less_equal(change, 1e-9 * size)
+
+    numbers = Numbers(NO_TURN, 1.0, 1.0, IDENTITY, 1.0, 1.0, 1.0, 1.0, (IDENTITY,) * trackers)
+    gains = Gains(IDENTITY, IDENTITY, IDENTITY, IDENTITY)
+    return Compiled(find, Instant(NO_TURN, IDENTITY, ZERO, remember(numbers, None)), gains, gains, ZERO, numbers, 1.0)
 
 
 def examples() -> list[Params]:
