@@ -286,12 +286,33 @@ def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
 def height_of(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
     """Return V of a claim at measurements as `value_of` does. Where the level holds the other quaternion of the target too,
     the set of a claim about the loop as it flies is its part with q0 > 0, and V is infinite outside of that, but for a law
-    that is the same at both."""
+    that is the same at both; so it is beyond the bounds of the set's rate and torque."""
     value = value_of(claim.programs, loop, shown)
-    if value is None or claim.kind not in BOUNDED or loop.law.card.quaternion_sign == "even":
+    if value is None or claim.kind not in BOUNDED:
+        return value
+    value = np.where(beyond(claim, loop, shown), np.inf, value)
+    if loop.law.card.quaternion_sign == "even":
         return value
     other = value_of(claim.programs, loop, shown._replace(attitude=(-1.0, *ZERO), rate=ZERO))
     return np.where((np.asarray(shown.attitude[0]) > 0.0) | (other > claim.numbers["start"]), value, np.inf)
+
+
+def beyond(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
+    """Return where the body turns faster, or the law asks for more because of the state alone, than in the set of a claim."""
+    n = claim.numbers
+    far = 2.0 * kinetic_energy(shown.rate, loop.craft) > n.get("kinetic", np.inf)
+    if "asked_torque" not in n and "asked_motors" not in n:
+        return far
+    # Without any momentum the wheels store the opposite of the body's.
+    stored = subtract(ZERO, apply(loop.craft.inertia, shown.rate))
+    alone = Measurement(shown.attitude, shown.rate, shown.rate, ZERO, ZERO, ZERO, ZERO, loop.period, stored)
+    asked = np.array(evaluated(claim.programs["law"], measurement=alone, craft=loop.known, gains=loop.gains))
+    far |= (np.abs(asked) > n.get("asked_torque", np.inf)).any(axis=0)
+    if "asked_motors" in n and loop.wheels is not None:
+        limits = np.array([np.inf if x is None else x for x in n["asked_motors"]])
+        driven = np.array(loop.wheels.axes)[limits > 0.0]
+        far |= (limits[limits > 0.0] < np.abs(np.linalg.pinv(driven.T) @ asked).T).T.any(axis=0)
+    return far
 
 
 def value_of(programs: Mapping[str, Any], loop: ClosedLoop, shown: Measurement) -> Any:

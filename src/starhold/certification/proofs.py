@@ -299,8 +299,17 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         **({"late_torque": below(numbers["late.torque.begun"])} if "late.torque.begun" in numbers else {}),
         **({"told_growth": grown} if any(grown) else {}),
         "start": above(numbers["level"] - behind),
+        **({"kinetic": below(numbers["kinetic"])} if "kinetic" in numbers else {}),
+        **(_asked(numbers, loop) if "asked" in numbers else {}),
         **{name: above(numbers[key]) for name, key in ends.items()},
     }
+
+
+def _asked(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
+    """Return what the law may ask for because of the state alone: about each axis, and of each motor (N m)."""
+    share, motors = numbers["asked"], [numbers.get(f"motors.{k}") for k in range(len(loop.loop.rotors))]
+    asked = {"asked_torque": below(share * numbers["limit"])} if "limit" in numbers else {}
+    return asked | {"asked_motors": [None if x is None else below(share * x) for x in motors]} if any(motors) else asked
 
 
 def _appended(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:

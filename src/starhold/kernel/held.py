@@ -8,14 +8,16 @@ the motion, and the effects of their changes. Docs/kernel.md, 10.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
+from math import factorial
 
 from .follower import Costs, Follower
 from .loops import AXES, NONE, AttitudeLoop
 from .near import CHANGE, MOMENTA, between, form_of, near_target
+from .norms import Norms, norms
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .plans import PLANNED, Plan
 from .polynomials import Poly, apply, cross, dot, fastest, largest, minus, most, total, var, variables
@@ -48,7 +50,7 @@ from .regions import (
     with_momentum,
 )  # fmt: skip
 
-WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
+WEIGHT, ZERO, ORDER, LONG, TAYLOR = Fraction(8), Fraction(0), 4, 800, 3
 KINETIC = "kinetic"
 """A bound of w.Jw in all motions."""
 NEARER = Fraction(17, 16)
@@ -185,6 +187,16 @@ class Held(Follower):
     def by_law(self, rates: list[Poly], shares: list[Fraction]) -> Poly:
         """Return the sum of shares of V' and its derivatives, with the law's torque."""
         return dot(shares, rates).at(self.commanded)
+
+    def mean_rate(self, p: Poly, kinds: Collection[str]) -> tuple[Poly, Norms, Poly]:
+        """Return the mean rate of change of a function of q and w in a period without disturbances, up to a derivative: the
+        terms with factors of these letters, and bounds of the rest; and that derivative while the torque is held."""
+        rates = [self.along(p)]
+        while len(rates) < TAYLOR:
+            rates.append(self.along(rates[-1]))
+        mean = dot([self.h**k / factorial(k + 1) for k in range(TAYLOR)], rates).at(self.commanded)
+        short = mean.only(lambda m: "".join(sorted(name[0] for name in m)) in kinds)
+        return short, norms(mean - short), rates[-1]
 
     def form(self, c: Fraction) -> Rows:
         """Return the matrix of x.Gx + c |q|^2."""

@@ -26,7 +26,7 @@ from starhold.certification.evidence.lates import begun_late, numbers_of, restin
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
-from starhold.certification.evidence.shapes import Shape, largest_in
+from starhold.certification.evidence.shapes import Shape, largest_in, soft
 from starhold.certification.evidence.slow import slowed
 from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
 from starhold.certification.matrices import above
@@ -44,8 +44,10 @@ Array = NDArray[np.float64]
 
 ANGLES = (175, 150, 120, 105, 90, 75, 60, 52, 45, 40, 35, 30, 25, 22, 20, 17, 15, 12, 10, 8, 7, 6, 5, 4, 3, 2, 1, 0.5)
 """The initial rotations (deg) from which convergence is attempted."""
-RATES = (5, 3, 2, 1, 0.5)
+RATES = (5, 3, 2, 1)
 """The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
+WORTH = 0.75
+"""The share of the largest possible rotation that is worth to begin at a higher rate."""
 NEARLY = 10.0
 """A chain of levels that ends below this multiple of its `aim` is taken, and no other one is looked for."""
 LEAST = 1e-6
@@ -79,7 +81,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
     for noisy in kinds:
         against = loop.known.against(loop.known.envelope(noisy))
         try:
-            if any(pushed.find_largest(*one) for pushed in ways(loop, against, noisy, tried[0]) for one in tried):
+            if finds(Pushed(loop, against, noisy), tried):
                 return True
         except (RefusedError, ArithmeticError, ValueError, np.linalg.LinAlgError) as reason:
             # Floats may be too far apart in size, or too large.
@@ -87,12 +89,17 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
     return False
 
 
-def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pushed]:
-    """Return the searches by the law's own even V and by another, that of the larger start first."""
-    first = Pushed(loop, against, noisy)
-    both = [first, first.by_another()] if first.even else [first]
-    angle, rate = both[-1].start(*begin) if first.even else (0.0, 0.0)
-    return both if not angle or first.may_begin(angle, rate, begin[2]) else both[::-1]
+def finds(first: Pushed, tried: list[Beginning]) -> bool:
+    """Find the claim from the largest start: by the law's own even V if it may begin where another V does, or else by that."""
+    both = [first]
+    if first.even:
+        other, limits = first.by_another(), tried[0][2]
+        start = other.start(*tried[0])
+        if start[0] and first.find(*start, limits):
+            other.explain(start)
+            return True
+        both = [other, first] if start[0] else [first, other]
+    return any(pushed.find_largest(*one) for pushed in both for one in tried)
 
 
 class Lean(NamedTuple):
@@ -147,6 +154,7 @@ class Pushed:
         """Begin the search."""
         self.larger, self.beginnings = list[tuple[float, float, str]](), dict[tuple[Any, ...], tuple[list[Start], str]]()
         self.slow, self.known = dict[tuple[Any, ...], list[Chain]](), dict[Shape, Lean]()
+        self.stuck = set[Shape]()
 
     def by_another(self) -> Pushed:
         """Return the search by a V with another potential than the law's own; it has not begun."""
@@ -182,10 +190,14 @@ class Pushed:
         for angle, rates in self.starts(angles, rate, limits, beyond):
             for one in rates:
                 if self.kept(self.find, angle, one, limits):
-                    *_, nearest = min((start for start in self.larger if start[:2] > (angle, one)), default=("",))
-                    self.loop.failed |= {POINTS: nearest} if nearest else {}
+                    self.explain((angle, one))
                     return True
         return False
+
+    def explain(self, start: tuple[float, float]) -> None:
+        """Keep why there is no claim from the next larger start."""
+        *_, nearest = min((one for one in self.larger if one[:2] > start), default=("",))
+        self.loop.failed |= {POINTS: nearest} if nearest else {}
 
     def starts(
         self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]
@@ -203,11 +215,19 @@ class Pushed:
         if first == len(angles):
             first = bisect_left(angles, True, key=far_enough)
         faster = [one for one in beyond if one > rate > 0.0]
-        for angle in angles[first:]:
+
+        def fastest(angle: float) -> tuple[float, ...]:
+            place = bisect_left(faster, True, key=lambda one: self.kept(self.may_begin, angle, one, limits))
+            return *faster[place : place + 1], rate
+
+        near = [angle for angle in angles[first:] if faster and angle >= WORTH * angles[first]]
+        # A somewhat smaller angle is worth a higher rate.
+        ways = [(angle, fastest(angle)) for angle in near[:: max(len(near) - 1, 1)]]
+        yield from sorted(ways, key=lambda way: way[1][0], reverse=True)
+        for angle in angles[first + bool(near) :]:
             if self.too_near((angle, rate, *limits.items())):
                 break
-            place = bisect_left(faster, True, key=lambda one: self.kept(self.may_begin, angle, one, limits))
-            yield angle, (*faster[place : place + 1], rate)
+            yield angle, fastest(angle)
 
     def start(self, *begin: Any) -> tuple[float, float]:
         """Return the largest of the starts, zeros where there is none."""
@@ -237,16 +257,17 @@ class Pushed:
         """Return chains from a start set; none, and the reason in `failed`, where V does not decrease on the set or the
         torque exceeds its limits there. Within limits it is one, by the first V for which neither is so."""
         loop, numbers = self.loop, self.beginning(angle, rate, limits)
-        loop.failed[POINTS], shapes = RISES, [lean.shape for lean in self.leans]
-        together, slow, tried = [] if limits else [self.chain(shape, angle, rate) for shape in shapes], list[Chain](), 0
-        for first in together or self.slowed(shapes, angle, rate, limits):
+        loop.failed[POINTS] = "the torque exceeds its limit" if limits else RISES
+        together = [] if limits else [self.chain(lean.shape, angle, rate) for lean in self.leans]
+        slow, tried = list[Chain](), 0
+        for first in together or self.within(angle, rate, limits):
             # Without limits larger sets may follow, on which disturbances matter less.
             tried += 1
             if not first.decreases(noticeably=bool(limits)):
                 slow.append(first)
             elif begins(loop, first.motion, numbers | first.of_level(), first.scales):
                 return together or [first]
-        if len(slow) == tried:
+        if 0 < tried == len(slow):
             self.slow[angle, rate, *limits.items()] = slow
         return []
 
@@ -255,12 +276,14 @@ class Pushed:
         does, because it takes another level of each."""
         return any(one.wants_more() for one in self.slow.get(start, ()))
 
-    def slowed(self, shapes: list[Shape], angle: float, rate: float, limits: dict[str, float]) -> Iterator[Chain]:
-        """Yield chains of each V, first those with bounds that seem to hold in the set of the start."""
-        for shape in shapes:
+    def within(self, angle: float, rate: float, limits: dict[str, float]) -> Iterator[Chain]:
+        """Yield chains to try within limits: of V with the potential as it is, with bounds that motions keep although the set
+        holds states beyond; and of shapes whose set demands little torque."""
+        for shape in [lean.shape for lean in self.leans if lean.shape in self.usual[1:3] and lean.shape not in self.stuck]:
             whole = self.chain(shape, angle, rate)
-            for slow in slowed(whole.motion, whole.level, angle, rate, limits):
+            if slow := slowed(whole.motion, whole.level, angle, rate, limits):
                 yield self.chain(shape, angle, rate, slow)
+        for shape in soft(self.sampled(self.usual[0]).motion, limits, angle, rate, self.usual):
             yield self.chain(shape, angle, rate)
 
     def beginning(self, angle: float, rate: float, limits: dict[str, float]) -> dict[str, Any]:
@@ -283,7 +306,8 @@ class Pushed:
         """Find the pointing claim of the loop, and add it. The set contains rotations of up to `angle` (rad) at up to `rate`
         (rad/s); limits: of the torque about each axis (`limit`) or its norm (`limit.norm`), or of wheels."""
         loop, limits = self.loop, limits or {}
-        if not self.may_begin(angle, rate, limits):
+        begin = angle, rate, limits
+        if not self.may_begin(*begin):
             return False
         numbers = self.beginning(angle, rate, limits)
         begun = [self.chain(shape, angle, rate, slow) for shape, slow in self.beginnings[angle, rate, *limits.items()][0]]
@@ -302,6 +326,11 @@ class Pushed:
         numbers |= {"end.angle": angle, "end.rate": fastest, "settling": float(motion.h * chain.samples) * MORE}
         if not isfinite(angle) or angle > NEARER * numbers.get("angle", numbers.get("start.angle", 0.0)):
             loop.failed[POINTS] = "motions do not come near the target"
-            return False
+            if not chain.slow:
+                return False
+            # This V does not descend further from any start.
+            self.stuck.add(chain.shape)
+            self.beginnings.clear()
+            return self.find(*begin)
         claim = self.claim(chain.V, numbers, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
         return loop.try_to_show(claim, scales, self.sampled(chain.shape).motion.points)

@@ -1,6 +1,5 @@
 """Looks for bounds of the body's rate and of the law's torque that motions keep although {V <= level} holds states beyond."""
 
-from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
 
@@ -12,8 +11,8 @@ from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import floats
 from starhold.kernel.held import KINETIC, Held
 from starhold.kernel.numbers import RefusedError
-from starhold.kernel.polynomials import Poly, dot
-from starhold.kernel.regions import RATE, STATE, Tube
+from starhold.kernel.polynomials import Poly, dot, minus
+from starhold.kernel.regions import RATE, STATE, Tube, felt
 from starhold.kernel.theorems.kinetic import (
     ASKED,
     ASKED_PACE,
@@ -21,8 +20,6 @@ from starhold.kernel.theorems.kinetic import (
     PACE,
     QUARTIC,
     changing,
-    mean_rate,
-    short,
     twice_energy,
 )  # fmt: skip
 
@@ -37,25 +34,27 @@ ROOM, TURNS, SHARES = 1.005, 50, np.geomspace(0.02, 1.0, 25)
 w.Jw in ellipsoids that contain both sets."""
 
 
-def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[str, Any]) -> Iterator[dict[str, float]]:
-    """Yield the claim's numbers of bounds that seem to hold in {V <= level} for motions from a start: of the rate; and if the
-    law asks for more than its limits nonetheless, of that too. The motion is left with the last bound of the rate."""
-    slow = bound_of_rate(motion, level, rate)
-    rows = shares(motion, limits)
-    if slow and len(rows):
-        tube = motion.tube(motion.region(Fraction(level)))
-        if asked := bound_of_torque(motion, tube, level, angle, rate, rows):
-            yield slow | asked
-            return
-    if slow:
-        yield slow
+def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[str, Any]) -> dict[str, float]:
+    """Return the claim's numbers of bounds that seem to hold in {V <= level} for motions from a start: of the rate, and of the
+    torque if that exceeds its limits nonetheless; none where one is not found."""
+    try:
+        slow = bound_of_rate(motion, level, rate)
+        rows = shares(motion, {name: x for name, x in limits.items() if name != "limit.norm"})
+        if slow and len(rows) and motion.plan is None and motion.loop.added is None:
+            tube = motion.tube(motion.region(Fraction(level)))
+            asked = bound_of_torque(motion, tube, level, angle, rate, rows)
+            return {} if asked is None else slow | asked
+    except RefusedError:
+        # The set is too large.
+        return {}
+    return slow
 
 
 def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
     """Return the numbers of a bound of w.Jw that seems to hold, as small as possible; none where there is none."""
     motion.kinetic = None
     G, region, paces = twice_energy(motion), motion.region(Fraction(level)), PACES / float(motion.h)
-    changed = short(mean_rate(motion, G)[0], QUARTIC)
+    changed = motion.mean_rate(G, QUARTIC)[0]
     ends = [form_of(changed, q0) for q0 in (Fraction(1), max(region.least, Fraction(0)))]
     root, energy = np.linalg.inv(np.linalg.cholesky(floats(motion.under))), energy_of(motion)
     begun = float(np.linalg.norm(energy, 2)) * rate**2
@@ -70,10 +69,7 @@ def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
         if bound >= whole:
             break
         motion.kinetic = Fraction(bound)
-        try:
-            _, (more,), pushed = changing(motion, motion.tube(motion.region(Fraction(level))), [G], QUARTIC)
-        except RefusedError:
-            break
+        _, (more,), pushed = changing(motion, motion.tube(motion.region(Fraction(level))), [G], QUARTIC)
         after = needed + float(more + pushed) / paces
         if max(float(after.min()), begun) < bound:
             return {KINETIC: bound, PACE: float(paces[int(np.argmin(after))])}
@@ -84,17 +80,18 @@ def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
 
 def bound_of_torque(
     motion: Held, tube: Tube, level: float, angle: float, rate: float, rows: Array
-) -> dict[str, float]:
-    """Return the numbers of a bound of what the law asks for because of the state that seems to hold; none where there is
-    none, or where it asks for no more than its limits anyway. rows: what takes the torque to shares of its limits."""
+) -> dict[str, float] | None:
+    """Return the numbers of a bound of what the law asks for because of the state that seems to hold; none where it asks for
+    no more than its limits anyway, and None where there is no bound. rows: what takes the torque to shares of its limits."""
     inner = inside(motion, level)
 
     def reached(along: Array) -> float:
         return float(np.sqrt(np.einsum("li,nij,lj->ln", along, inner, along).min(axis=1).max()))
 
     torque, each = floats(motion.near.torque), np.linalg.norm(rows, axis=1)
-    spare = float(motion.misread(tube.region)[0]) * float(each.max())
-    if motion.plan is not None or reached(rows @ torque) < 1.0 - spare:
+    besides = felt(minus(motion.loop.u, motion.u), "h", tube.region.sizes) * motion.size("h")
+    spare = float(motion.misread(tube.region)[0] + besides) * float(each.max())
+    if reached(rows @ torque) < 1.0 - spare:
         return {}
     rates, more, pushed = changing(motion, tube, motion.u, CUBIC)
     linear, paces = rows @ np.array([slope_of(p) for p in rates]), PACES / float(motion.h)
@@ -102,7 +99,7 @@ def bound_of_torque(
     needed = [(reached(rows @ torque + linear / pace) + rest / pace, float(pace)) for pace in paces]
     share, pace = min(needed)
     share = max(share, at_first(motion, rows, angle, rate)) * ROOM
-    return {ASKED: share, ASKED_PACE: pace} if share < 1.0 else {}
+    return {ASKED: share, ASKED_PACE: pace} if share < 1.0 else None
 
 
 def at_first(motion: Held, rows: Array, angle: float, rate: float) -> float:
@@ -122,9 +119,10 @@ def inside(motion: Held, level: float) -> Array:
     """Return matrices of ellipsoids in (w, q), around rest, that contain {V <= level} as far as w.Jw is within its bound."""
     whole = floats(motion.under) / level
     if motion.kinetic is None:
-        return np.linalg.inv(whole)[None]
+        return np.asarray(np.linalg.inv(whole)[None], dtype=np.float64)
     slow = energy_of(motion) / float(motion.kinetic)
-    return np.linalg.inv(np.array([c * whole + (1.0 - c) * slow for c in SHARES]))
+    forms = [c * whole + (1.0 - c) * slow for c in SHARES]
+    return np.asarray(np.linalg.inv(np.array(forms)), dtype=np.float64)
 
 
 def energy_of(motion: Held) -> Array:

@@ -21,8 +21,8 @@ TORQUE, UNIT = "torque-limit", variables("d")
 class Asking(NamedTuple):
     """A law asks for `asked` because of the state alone, which stays within a share of each limit about an axis or of a
     motor. pace: how fast it may approach that (1/s), for each unit that is left. rates: polynomials of the mean rates of
-    change of `asked` from one sample to the next; rest: bounds of what these are besides, about each axis; pushed: of another
-    part, as a vector. begun, still: what is nonnegative, and what is zero, in states at first."""
+    change of `asked` from one sample to the next; rest: bounds of what these are besides, about each axis; pushed: of
+    another part, as a vector. begun, still: what is nonnegative, and what is zero, in states at first."""
 
     share: Fraction
     pace: Fraction
@@ -102,14 +102,13 @@ def within_limits(
         for text, unit, bound_of in (("motors give", "N m", motors), ("wheels store", "N m s", stored)):
             if any(x is not None for x in bound_of):
                 said.append(f"{text} no more than {', '.join('inf' if x is None else above(x) for x in bound_of)} {unit}")
-    if asking is not None:
-        asks = [(name, asking.share * bound, row) for name, bound, row, rest in limited if not rest.terms and row is not UNIT]
-        known += [most - dot(row, asking.asked) for _, most, row in asks]
-        for name, most, row in asks:
-            load, more = dot(row, asking.asked), reach([row], asking.rest)[0] + norm(row) * asking.pushed
-            yield f"{name} at first", Squares(most - load.at(asking.still), [poly(1), *q, *w], 0, asking.begun, [loop.sphere])
-            left = asking.pace * (most - load) - dot(row, asking.rates) - more
-            yield f"{name} falls", Squares(left, basis(loop, left), 0, known, [loop.sphere])
+    asks = list[tuple[str, Fraction, list[Fraction]]]()
+    for name, bound, row, rest in limited if asking is not None else ():
+        numbers_of = [Fraction(x) for x in row if not isinstance(x, Poly)]
+        if len(numbers_of) == len(AXES) and any(numbers_of) and not rest.terms:
+            # A share of the limit itself, which was reduced.
+            asks.append((name, asking.share * (bound + norm(numbers_of) * less), numbers_of))
+    known += [most - dot(row, asking.asked) for _, most, row in asks if asking is not None]
     for name, bound, row, rest in limited:
         used = [k for k in AXES if poly(row[k]).terms]
         cases = joined(loop.law[k] for k in used)
@@ -123,6 +122,12 @@ def within_limits(
             if load.terms:
                 full = name if len(cases) == 1 else f"{name} {n}"
                 yield full, within(bound, load, z, w, [*case.known, *squared * turned, *known], [loop.sphere])
+    for name, most, row in asks:
+        assert asking is not None
+        load, more = dot(row, asking.asked), reach([row], asking.rest)[0] + norm(row) * asking.pushed
+        yield f"{name} at first", Squares(most - load.at(asking.still), [poly(1), *q, *w], 0, asking.begun, [loop.sphere])
+        left = asking.pace * (most - load) - dot(row, asking.rates) - more
+        yield f"{name} falls", Squares(left, basis(loop, left), 0, known, [loop.sphere])
     with_ = f"with {enumerated(bounds)} " if bounds else ""
     return Statement(with_ + enumerated(said), tuple(assumed), "wheels" if limits else TORQUE)
 
