@@ -298,7 +298,7 @@ def height_of(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
 
 
 def beyond(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
-    """Return where the body turns faster, or the law asks for more because of the state alone, than in the set of a claim."""
+    """Return where the body turns faster, or the law asks for more because of the state, than in the set of a claim."""
     n = claim.numbers
     far = 2.0 * kinetic_energy(shown.rate, loop.craft) > n.get("kinetic", np.inf)
     if "asked_torque" not in n and "asked_motors" not in n:

@@ -8,16 +8,15 @@ the motion, and the effects of their changes. Docs/kernel.md, 10.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from math import factorial
+from typing import Any
 
 from .follower import Costs, Follower
 from .loops import AXES, NONE, AttitudeLoop
 from .near import CHANGE, MOMENTA, between, form_of, near_target
-from .norms import Norms, norms
+from .norms import Norms
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .plans import PLANNED, Plan
 from .polynomials import Poly, apply, cross, dot, fastest, largest, minus, most, total, var, variables
@@ -50,7 +49,7 @@ from .regions import (
     with_momentum,
 )  # fmt: skip
 
-WEIGHT, ZERO, ORDER, LONG, TAYLOR = Fraction(8), Fraction(0), 4, 800, 3
+WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
 KINETIC = "kinetic"
 """A bound of w.Jw in all motions."""
 NEARER = Fraction(17, 16)
@@ -64,6 +63,8 @@ class Held(Follower):
         numbers, x = loop.claim.numbers, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
         self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
+        # How fast functions of the state change, once that is known.
+        self.rates = dict[Any, tuple[Poly, Norms, Poly]]()
         # What noise adds near the target, and what momentum adds to that.
         self.swayed = self.apart = AT_REST
         self.random = numbers.get("noise.torque") or ZERO
@@ -187,16 +188,6 @@ class Held(Follower):
     def by_law(self, rates: list[Poly], shares: list[Fraction]) -> Poly:
         """Return the sum of shares of V' and its derivatives, with the law's torque."""
         return dot(shares, rates).at(self.commanded)
-
-    def mean_rate(self, p: Poly, kinds: Collection[str]) -> tuple[Poly, Norms, Poly]:
-        """Return the mean rate of change of a function of q and w in a period without disturbances, up to a derivative: the
-        terms with factors of these letters, and bounds of the rest; and that derivative while the torque is held."""
-        rates = [self.along(p)]
-        while len(rates) < TAYLOR:
-            rates.append(self.along(rates[-1]))
-        mean = dot([self.h**k / factorial(k + 1) for k in range(TAYLOR)], rates).at(self.commanded)
-        short = mean.only(lambda m: "".join(sorted(name[0] for name in m)) in kinds)
-        return short, norms(mean - short), rates[-1]
 
     def form(self, c: Fraction) -> Rows:
         """Return the matrix of x.Gx + c |q|^2."""
@@ -343,17 +334,6 @@ class Held(Follower):
             form, paid, spare = self.paid(self.late, change, form, costs)
             rest += paid
         return form, over, F, kept * more, rest, spare
-
-    def mover(self, tube: Tube) -> tuple[Callable[[Fraction], list[Fraction]], Fraction]:
-        """Return how far a torque of some size moves the rates in a period from the undisturbed motion, in which momentum
-        turns with the body; and the torque due to changes of target, momentum and the torque that the law knows."""
-        calm, slower = self.unlike_body(tube.sizes, self.parted)
-        columns, h = [*zip(self.widths, tube.bent, strict=True)], self.h
-
-        def moved_by(p: Fraction) -> list[Fraction]:
-            return settled(lambda d: [h * ((p + slower * norm(d)) * n + reach([row], d)[0]) for n, row in columns])
-
-        return moved_by, calm
 
     def swing(self, tube: Tube) -> Fraction:
         """Return a bound of |V'| between samples."""

@@ -37,9 +37,9 @@ def total_of(bounds: Norms, lengths: Mapping[str, Fraction]) -> Fraction:
 
 
 def unfolded(terms: Mapping[Monomial, Fraction], letter: str, count: int) -> Rows:
-    """Return bounds of the entries of the matrix M of terms x.My, where x is one of `count` vectors with the letter, and y has
-    the products of all others: the square of the product of their lengths is the sum of squares of products, each as often
-    as it occurs."""
+    """Return bounds of the entries of the matrix M of terms x.My, where x is one of `count` vectors with the letter, and y
+    has the products of all others: the square of the product of their lengths is the sum of squares of products, each as
+    often as it occurs."""
     rest = sorted({without(m, name) for m in terms for name in m if name[0] == letter and name != "q0"})
     place, rows = {m: k for k, m in enumerate(rest)}, [[Fraction(0)] * len(rest) for _ in AXES]
     for m, c in terms.items():

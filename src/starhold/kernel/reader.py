@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import cached_property
 
 from .loops import AttitudeLoop
 from .numbers import Rows, added, norm, reach, root
 from .polynomials import Poly
-from .regions import AMISS, ANGLE, AT_REST, SPEED, Radii, Region, Sizes, Tube, as_told, felt, stretch
+from .regions import AMISS, ANGLE, AT_REST, SPEED, Radii, Region, Sizes, Tube, as_told, felt, settled, stretch
 
 ZERO = Fraction(0)
 
@@ -31,6 +31,8 @@ class Reader(ABC):
     h: Fraction
     off: Fraction
     light: Fraction
+    widths: list[Fraction]
+    parted: tuple[list[Poly], list[Poly]]
 
     @abstractmethod
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
@@ -133,3 +135,14 @@ class Reader(ABC):
         steady, turning = parts
         calm = self.stale(sizes, steady) + self.stale(sizes, turning, 0)
         return calm, felt(turning, "h", sizes) * self.h / 4 * self.size("h")
+
+    def mover(self, tube: Tube) -> tuple[Callable[[Fraction], list[Fraction]], Fraction]:
+        """Return how far a torque of some size moves the rates in a period from the undisturbed motion, in which momentum
+        turns with the body; and the torque due to changes of target, momentum and the torque that the law knows."""
+        calm, slower = self.unlike_body(tube.sizes, self.parted)
+        columns, h = [*zip(self.widths, tube.bent, strict=True)], self.h
+
+        def moved_by(p: Fraction) -> list[Fraction]:
+            return settled(lambda d: [h * ((p + slower * norm(d)) * n + reach([row], d)[0]) for n, row in columns])
+
+        return moved_by, calm

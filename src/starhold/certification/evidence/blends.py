@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -13,7 +13,6 @@ from starhold.certification.evidence.squares import mixed
 from starhold.kernel.follower import Late
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
-from starhold.kernel.norms import Norms
 from starhold.kernel.numbers import Rows, demand
 from starhold.kernel.plans import Plan
 from starhold.kernel.polynomials import Monomial, Poly
@@ -26,11 +25,10 @@ from starhold.kernel.theorems.pointing import descends
 
 @dataclass
 class Shared:
-    """Parts of V by their terms, in units of the first coefficient, a motion's attributes, and what `mean_rate` returns."""
+    """Parts of V by their terms, in units of the first coefficient, and a motion's attributes."""
 
     parts: dict[tuple[tuple[Monomial, Fraction], ...], Part] = field(default_factory=dict[Any, "Part"])
     motion: dict[str, Any] = field(default_factory=dict[str, Any])
-    rates: dict[Any, tuple[Poly, Norms, Poly]] = field(default_factory=dict[Any, tuple[Poly, Norms, Poly]])
 
 
 class Part:
@@ -63,7 +61,7 @@ class Blended(Held):
         else:
             super().__init__(loop)
             known.motion.update(vars(self))
-        self.known, self.rates = known.parts, known.rates
+        self.known = known.parts
         self.regions = dict[tuple[Fraction, Late | None, Fraction | None], Region]()
         self.tubes = dict[tuple[int, Late | None, Fraction | None], tuple[Region, Tube]]()
         self.falls = dict[tuple[int, Late | None, Fraction | None], tuple[Tube, Any]]()
@@ -91,13 +89,6 @@ class Blended(Held):
         if key not in self.falls:
             self.falls[key] = tube, super().fall(tube)
         return self.falls[key][1]
-
-    def mean_rate(self, p: Poly, kinds: Collection[str]) -> tuple[Poly, Norms, Poly]:
-        """Return the mean rate of change of a function of q and w, which does not depend on V."""
-        key = *kinds, p.lower, *p.upper.items()
-        if key not in self.rates:
-            self.rates[key] = super().mean_rate(p, kinds)
-        return self.rates[key]
 
     def points(self, claim: Claim) -> Proof:
         """The theorem `points`, in which what was found out about this motion, that of the claim, is not found out again."""

@@ -90,7 +90,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
 
 
 def finds(first: Pushed, tried: list[Beginning]) -> bool:
-    """Find the claim from the largest start: by the law's own even V if it may begin where another V does, or else by that."""
+    """Find the claim from the largest start: by the law's own even V if it may begin there, or else by another V."""
     both = [first]
     if first.even:
         other, limits = first.by_another(), tried[0][2]
@@ -277,8 +277,8 @@ class Pushed:
         return any(one.wants_more() for one in self.slow.get(start, ()))
 
     def within(self, angle: float, rate: float, limits: dict[str, float]) -> Iterator[Chain]:
-        """Yield chains to try within limits: of V with the potential as it is, with bounds that motions keep although the set
-        holds states beyond; and of shapes whose set demands little torque."""
+        """Yield chains to try within limits: of V with the potential as it is, with bounds that motions keep although the
+        set holds states beyond; and of shapes whose set demands little torque."""
         for shape in [lean.shape for lean in self.leans if lean.shape in self.usual[1:3] and lean.shape not in self.stuck]:
             whole = self.chain(shape, angle, rate)
             if slow := slowed(whole.motion, whole.level, angle, rate, limits):

@@ -1,4 +1,4 @@
-"""Looks for bounds of the body's rate and of the law's torque that motions keep although {V <= level} holds states beyond."""
+"""Looks for bounds of the body's rate and of the law's torque that motions keep although {V <= level} holds other states."""
 
 from fractions import Fraction
 from typing import Any
@@ -20,6 +20,7 @@ from starhold.kernel.theorems.kinetic import (
     PACE,
     QUARTIC,
     changing,
+    mean_rate,
     twice_energy,
 )  # fmt: skip
 
@@ -30,13 +31,13 @@ PACES = np.geomspace(3e-3, 1.0, 60)
 WIDER, ROUNDS = 1.03, 8
 """The ratio of bounds that are tried, and how many are."""
 ROOM, TURNS, SHARES = 1.005, 50, np.geomspace(0.02, 1.0, 25)
-"""How much more of a limit the law may ask for than it does at first, how many turns are examined, and the weights of V beside
-w.Jw in ellipsoids that contain both sets."""
+"""How much more of a limit the law may ask for than it does at first, how many turns are examined, and the weights of V
+beside w.Jw in ellipsoids that contain both sets."""
 
 
 def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[str, Any]) -> dict[str, float]:
-    """Return the claim's numbers of bounds that seem to hold in {V <= level} for motions from a start: of the rate, and of the
-    torque if that exceeds its limits nonetheless; none where one is not found."""
+    """Return the claim's numbers of bounds that seem to hold in {V <= level} for motions from a start: of the rate, and of
+    the torque if that exceeds its limits nonetheless; none where one is not found."""
     try:
         slow = bound_of_rate(motion, level, rate)
         rows = shares(motion, {name: x for name, x in limits.items() if name != "limit.norm"})
@@ -54,7 +55,7 @@ def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
     """Return the numbers of a bound of w.Jw that seems to hold, as small as possible; none where there is none."""
     motion.kinetic = None
     G, region, paces = twice_energy(motion), motion.region(Fraction(level)), PACES / float(motion.h)
-    changed = motion.mean_rate(G, QUARTIC)[0]
+    changed = mean_rate(motion, G, QUARTIC)[0]
     ends = [form_of(changed, q0) for q0 in (Fraction(1), max(region.least, Fraction(0)))]
     root, energy = np.linalg.inv(np.linalg.cholesky(floats(motion.under))), energy_of(motion)
     begun = float(np.linalg.norm(energy, 2)) * rate**2

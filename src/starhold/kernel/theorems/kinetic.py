@@ -1,5 +1,5 @@
-"""A bound of the body's rate that holds although it does not on all of {V <= level}: the kinetic energy of the motion relative
-to the target falls before it reaches a bound. Proof: docs/kernel-flying.md."""
+"""Bounds of the body's rate and of the law's torque that motions keep although {V <= level} holds states beyond: both fall
+before they reach them. Proof: docs/kernel-flying.md."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Collection, Sequence
 from fractions import Fraction
 from math import factorial
 
-from ..held import TAYLOR, Held
-from ..norms import total_of
+from ..held import Held
+from ..norms import Norms, norms, total_of
 from ..numbers import demand, norm
 from ..polynomials import Poly, apply, dot, fastest
 from ..regions import ANGLE, SPEED, Tube, felt, stretch
@@ -17,8 +17,10 @@ from .attitude import within_turn
 from .limits import Asking, basis
 
 PACE, ASKED, ASKED_PACE = "kinetic.pace", "asked", "asked.pace"
-"""How fast w.Jw may approach its bound (1/s), for each unit that is left; the share of its limits that the law asks for at most
-because of the state alone, and how fast it may approach that."""
+"""How fast w.Jw may approach its bound (1/s), for each unit that is left; the share of its limits that the law asks for at
+most because of the state alone, and how fast it may approach that."""
+TAYLOR = 3
+"""The order of the derivative that is bounded."""
 CUBIC = ("q", "w", "qq", "qw", "ww", "qqw")
 QUARTIC = (*CUBIC, "qqqq")
 """The letters of monomials that stand in a sum of squares."""
@@ -60,6 +62,20 @@ def twice_energy(motion: Held) -> Poly:
     return dot(motion.loop.w, apply(motion.loop.given, motion.loop.w))
 
 
+def mean_rate(motion: Held, p: Poly, kinds: Collection[str]) -> tuple[Poly, Norms, Poly]:
+    """Return the mean rate of change of a function of q and w in a period without disturbances, up to a derivative: the
+    terms with factors of these letters, and bounds of the rest; and that derivative while the torque is held."""
+    key = *kinds, p.lower, *p.upper.items()
+    if key not in motion.rates:
+        rates = [motion.along(p)]
+        while len(rates) < TAYLOR:
+            rates.append(motion.along(rates[-1]))
+        mean = dot([motion.h**k / factorial(k + 1) for k in range(TAYLOR)], rates).at(motion.commanded)
+        short = mean.only(lambda m: "".join(sorted(name[0] for name in m)) in kinds)
+        motion.rates[key] = short, norms(mean - short), rates[-1]
+    return motion.rates[key]
+
+
 def changing(
     motion: Held, tube: Tube, parts: Sequence[Poly], kinds: Collection[str]
 ) -> tuple[list[Poly], list[Fraction], Fraction]:
@@ -70,7 +86,7 @@ def changing(
     lengths = {"w": tube.region.sizes[SPEED], "q": tube.region.sizes[ANGLE]} | motion.extents
     moved_by, calm = motion.mover(tube)
     away = norm(moved_by(tube.steady + tube.pushed + tube.late.moved + calm)) / h
-    rates = [motion.mean_rate(p, kinds) for p in parts]
+    rates = [mean_rate(motion, p, kinds) for p in parts]
     rest = [
         total_of(norms, lengths) + h**TAYLOR / factorial(TAYLOR + 1) * fastest(last, sizes, speeds)
         for _, norms, last in rates

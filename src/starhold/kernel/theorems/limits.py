@@ -103,12 +103,12 @@ def within_limits(
             if any(x is not None for x in bound_of):
                 said.append(f"{text} no more than {', '.join('inf' if x is None else above(x) for x in bound_of)} {unit}")
     asks = list[tuple[str, Fraction, list[Fraction]]]()
-    for name, bound, row, rest in limited if asking is not None else ():
-        numbers_of = [Fraction(x) for x in row if not isinstance(x, Poly)]
-        if len(numbers_of) == len(AXES) and any(numbers_of) and not rest.terms:
+    for name, bound, row, rest in limited if asking else ():
+        exact = [Fraction(x) for x in row if not isinstance(x, Poly)]
+        if asking and len(exact) == len(AXES) and any(exact) and not rest.terms:
             # A share of the limit itself, which was reduced.
-            asks.append((name, asking.share * (bound + norm(numbers_of) * less), numbers_of))
-    known += [most - dot(row, asking.asked) for _, most, row in asks if asking is not None]
+            asks.append((name, asking.share * (bound + norm(exact) * less), exact))
+            known.append(asks[-1][1] - dot(exact, asking.asked))
     for name, bound, row, rest in limited:
         used = [k for k in AXES if poly(row[k]).terms]
         cases = joined(loop.law[k] for k in used)
