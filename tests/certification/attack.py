@@ -56,6 +56,35 @@ class Attack(Oracle):
         n = self.numbers
         return n["level"] - n.get("late.torque.weight", 0.0) * n.get("late.torque.begun", 0.0) ** 2
 
+    def loads(self, u):
+        """The largest share of a limit, of the torque or of a motor, that torques (3, lanes) take."""
+        n = self.numbers
+        used = [np.linalg.norm(u, axis=0) / n.get("limit.norm", np.inf), *np.abs(u) / n.get("limit", np.inf)]
+        turned = [k for k in range(len(n)) if n.get(f"motors.{k}")]
+        if turned:
+            axes = np.array([[self.subject[f"wheel.{k}.axis.{i}"] for k in turned] for i in range(3)])
+            used += [*np.abs(np.linalg.pinv(axes) @ u) / np.array([[n[f"motors.{k}"]] for k in turned])]
+        return np.max(used, axis=0)
+
+    def kept_bounds(self, law, q, w):
+        """The shares of the claim's bounds of w.Jw, and of what the law asks for because of the state, that states take."""
+        n = self.numbers
+        asked = self.loads(law(q, w)) / n["asked"] if "asked" in n else np.zeros(w.shape[1])
+        return (w * (self.J @ w)).sum(axis=0) / n.get("kinetic", np.inf), asked
+
+    def into(self, law, q, w):
+        """States of the set near those that are beyond its bounds of rate and torque."""
+        q, w = q.copy(), w.copy()
+        for k in range(400):
+            beyond = np.max(self.kept_bounds(law, q, w), axis=0) > 1.0
+            if not beyond.any():
+                return q, w
+            w[:, beyond] *= 0.97
+            if k > 100:
+                q[1:, beyond] *= 0.97
+                q[0, beyond] = np.sqrt(1.0 - (q[1:, beyond] ** 2).sum(axis=0)) * np.where(q[0, beyond] < 0.0, -1.0, 1.0)
+        raise AssertionError("no state of the set was found")
+
     def worst(self):
         """What contradicts the claim, or "", and the largest angle and rate in the end as shares of the claimed ones."""
         n, h = self.numbers, self.numbers["period"]
@@ -64,7 +93,15 @@ class Attack(Oracle):
         states = [self.border(V0, self.highest_start() * self.rng.uniform() * (k % 3 > 0)) for k in range(half)]
         begin = (np.concatenate([np.array(part).T, np.tile(rest[:, None], half)], axis=1) for part, rest in zip(
             zip(*states, strict=True), (np.eye(4)[0], np.zeros(3)), strict=True))  # fmt: skip
+        begin, law, self.used = self.into(fleet.law, *begin), fleet.law, np.zeros(3)
         near = np.arange(self.lanes) >= half
+
+        def asking(q, w, *around):
+            u = law(q, w, *around)
+            self.used[2] = max(self.used[2], self.loads(u).max())
+            return u
+
+        fleet.law = asking
         periods = int(min(n["settling"] / h + 300, self.longest))
         extremal, usual, way = self.spell(periods), fleet.push, self.rng.choice([-1.0, 1.0], self.lanes)
 
@@ -89,8 +126,10 @@ class Attack(Oracle):
             angle, rate = turn(q) / n["end.angle"], np.linalg.norm(w, axis=0) / n["end.rate"]
             shares = [high, *(float(x[settled].max()) if settled.any() else 0.0 for x in (angle, rate))]
             reached = [max(pair) for pair in zip(reached, shares, strict=True)]
+            self.used[:2] = np.maximum(self.used[:2], np.max(self.kept_bounds(law, q, w), axis=1))
+            shares += [*self.used]
             if max(shares) > 1.0 and not found:
-                name = ("V", "angle", "rate")[int(np.argmax(shares))]
+                name = ("V", "angle", "rate", "w.Jw", "what is asked because of the state", "torque")[int(np.argmax(shares))]
                 found = f"{name} is {max(shares):.6g} of its bound after {k * h:g} s"
         return found, reached
 

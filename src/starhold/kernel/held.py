@@ -49,9 +49,7 @@ from .regions import (
     with_momentum,
 )  # fmt: skip
 
-WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
-KINETIC = "kinetic"
-"""A bound of w.Jw in all motions."""
+WEIGHT, ZERO, ORDER, LONG, KINETIC = Fraction(8), Fraction(0), 4, 800, "kinetic"
 NEARER = Fraction(17, 16)
 """Errors that grow with the motion count as settled within this factor of their limit."""
 
