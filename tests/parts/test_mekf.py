@@ -185,3 +185,20 @@ def test_bad_numbers():
         mekf.prepare(PARAMS._replace(boresight=(0.0, 0.0, 0.0)), PERIOD)
     with pytest.raises(ValueError, match="quaternion of length 1"):
         mekf.prepare(PARAMS._replace(start=(0.0, 0.0, 0.0, 0.0)), PERIOD)
+
+
+def test_settled_gains_are_those_to_which_steps_lead():
+    """They are found in machine code; here step by step, with a bias that wanders so much that they settle soon."""
+    rate, every = (0.0, -2e-3, 1e-3), 3
+    numbers = mekf.prepare(PARAMS._replace(bias_walk=0.3), 1.0)
+    memory, gains, change, size = mekf.remember(numbers, None)._replace(rate=rate), [np.zeros((4, 3, 3))], 1.0, 0.0
+    while np.any(change > 1e-9 * size):
+        for _ in range(every):
+            now = mekf.arrived(mekf.propagated(memory, rate, numbers, 1.0), numbers)
+            memory = now.memory
+        by = mekf.correction(now, [(now.attitude, True)], [], numbers)
+        memory = mekf.corrected(now, by, numbers, 1.0).memory
+        gains.append(by.gain)
+        change, size = (np.abs(x).max(axis=(1, 2)) for x in (np.subtract(*gains[-2:]), np.array(by.gain)))
+    assert 3 < len(gains) < 1000
+    assert mekf.settled(numbers, every, rate, 1.0) == gains[-1]

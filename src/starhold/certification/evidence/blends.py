@@ -1,4 +1,4 @@
-"""What motions of one loop with different V share: the derivatives of V's parts, and all that does not depend on V."""
+"""Motions of one loop with different V, which share the derivatives of V's parts, and all that does not depend on V."""
 
 from __future__ import annotations
 
