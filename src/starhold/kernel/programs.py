@@ -140,6 +140,8 @@ def joined(values: Iterable[Piecewise], most: int = CASES) -> Piecewise:
 def contradictory(guards: Guards) -> bool:
     """Tell whether a condition must both hold and fail, or two opposite ones must hold."""
     Account.spend(1 + len(guards))
+    if not guards:
+        return False
     against = {(p, False) for p, truth in guards if truth}
     against |= {(tuple((m, -c) for m, c in p), True) for p, truth in guards if truth}
     return not against.isdisjoint(guards)
