@@ -11,7 +11,6 @@ from pydantic import BaseModel
 
 from starhold.report.tables import listed, titled
 from starhold.report.text import number_text, pretty_unit
-from starhold.scenario.checking import read_toml
 from starhold.scenario.quantity import meaning
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ MANY = 9
 def settings(scenario: Scenario) -> str:
     """Return all tables of a scenario as HTML, including those of its parts."""
     parts: list[str] = []
-    written = read_toml(scenario.text, scenario.where)
+    written = scenario.raw
     shared = {key: scenario.table.shared[key] for key in _taken(scenario)}
     for name in type(scenario.table).model_fields:
         table = getattr(scenario.table, name)
