@@ -132,7 +132,7 @@ def find(body: str, name: str) -> Law | None:
     """Return the installed law of this name for a body; None if there is none. No other law is loaded for it."""
     # Once all are loaded, laws from files may be listed among them.
     known = _installed.cache_info().currsize > 0
-    law = None if known else parts.own(starhold.laws.__name__, name, as_law)
+    law = None if known else parts.own_part(starhold.laws.__name__, name, as_law)
     return law if law is not None and law.body == body else catalogue(body).get(name)
 
 

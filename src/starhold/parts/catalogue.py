@@ -76,7 +76,7 @@ _BODIES: dict[str, Part] = {}
 def find(role: str, name: str) -> Part:
     """Return the installed part of this role and name, or the body of this name from a file. Raise KeyError if there is
     none."""
-    if (part := own(PACKAGES[role], name, as_part)) is not None:
+    if (part := own_part(PACKAGES[role], name, as_part)) is not None:
         return part
     installed = parts(role)
     return _BODIES[name] if role == "body" and name not in installed else installed[name]
@@ -151,7 +151,7 @@ def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str
     return {part.name: part for part in sorted(collected, key=lambda part: part.name)}
 
 
-def own(package: str, name: str, make: Callable[..., AnyPart]) -> AnyPart | None:
+def own_part(package: str, name: str, make: Callable[..., AnyPart]) -> AnyPart | None:
     """Return starhold's own part of this name, of whose package no other module is loaded; None where there is none, or
     where other packages offer parts: then all are loaded, because some may have to be left out."""
     word = name.replace("-", "_")

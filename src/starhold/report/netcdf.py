@@ -60,9 +60,9 @@ def write_netcdf(run: Recording, path: Path) -> None:
                 for dimension, size in zip(values.dimensions, data.shape, strict=True):
                     if dimension not in places:
                         places[dimension] = len(places)
-                        own = dimension == name
-                        scale = made if own else file.create_dataset(dimension, (size,), ">f4", track_order=True)
-                        scale.make_scale(name if own else f"{NO_VARIABLE}{size:10}")
+                        is_named = dimension == name
+                        scale = made if is_named else file.create_dataset(dimension, (size,), ">f4", track_order=True)
+                        scale.make_scale(name if is_named else f"{NO_VARIABLE}{size:10}")
                         scale.attrs["_Netcdf4Dimid"] = np.int32(places[dimension])
                 numbers = np.array([places[dimension] for dimension in values.dimensions], np.int32)
                 made.attrs["_Netcdf4Coordinates"] = numbers
