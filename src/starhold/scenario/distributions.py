@@ -1,6 +1,8 @@
 """The distributions of dispersed numbers. Each class is one distribution: its table in a file, the conversion of its
 parameters, and its inverse distribution function. Its field `distribution` gives its name; no other code names it."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -28,7 +30,7 @@ class Uniform(Spread):
     low: Annotated[Any, *raw("the least value")]
     high: Annotated[Any, *raw("the greatest value")]
 
-    def _numbers(self, key: "KeyReading") -> dict[str, Any]:
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
         return _ordered(key, key.numbers("low"), key.numbers("high"))
 
     def draw(self, u: Array) -> Array:
@@ -47,7 +49,7 @@ class Normal(Spread):
     mean: Annotated[Any, *raw("by default the file's value")] = None
     sigma: Annotated[Any, *raw("standard deviation")]
 
-    def _numbers(self, key: "KeyReading") -> dict[str, Any]:
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
         return {"mean": key.centre("mean"), "sigma": key.sigma(key.unit)}
 
     def draw(self, u: Array) -> Array:
@@ -65,12 +67,12 @@ class TruncatedNormal(Spread):
     high: Annotated[Any, *raw("the greatest value, if there is one")] = None
 
     @model_validator(mode="after")
-    def _is_cut(self) -> Self:
+    def _is_cut(self) -> TruncatedNormal:
         if self.low is None and self.high is None:
             raise at_key("low", "low, high or both; without them it is normal", None)
         return self
 
-    def _numbers(self, key: "KeyReading") -> dict[str, Any]:
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
         none = (math.inf,) * len(key.index)
         low = tuple(-x for x in none) if self.low is None else key.numbers("low")
         ends = _ordered(key, low, none if self.high is None else key.numbers("high"))
@@ -120,7 +122,7 @@ class LogNormal(Spread):
     median: Annotated[Any, *raw("by default the file's value")] = None
     sigma: Annotated[Any, *raw("standard deviation of the natural logarithm, no unit")]
 
-    def _numbers(self, key: "KeyReading") -> dict[str, Any]:
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
         median = key.centre("median")
         if not all(median):
             given = show(key.place.value if self.median is None else self.median)
@@ -140,7 +142,7 @@ class Choice(Relative):
     values: Annotated[list[Any], Field(description="words, booleans or numbers")]
     weights: Annotated[list[Any] | None, Field(description="relative probabilities; equal if absent")] = None
 
-    def _numbers(self, key: "KeyReading") -> dict[str, Any]:
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
         weights = [1.0] * len(self.values) if self.weights is None else self.weights
         if len(weights) != len(self.values):
             raise key.place.refuse("weights", f"{len(weights)} weights", f"one for each of the {len(self.values)} values")
@@ -172,7 +174,7 @@ class CorrelatedNormal(Relative):
     """The rows of the lower triangular L; L L^T is the covariance."""
 
     @model_validator(mode="after")
-    def _one_matrix(self) -> Self:
+    def _one_matrix(self) -> CorrelatedNormal:
         if (self.covariance is None) == (self.correlation is None):
             raise at_key("correlation", "either correlation with sigma, or covariance", self.correlation)
         if (self.covariance is None) == (self.sigma is None):
@@ -185,7 +187,7 @@ class CorrelatedNormal(Relative):
         """One uniform per number."""
         return len(self.mean)
 
-    def read(self, keys: Sequence["KeyReading"]) -> Self:
+    def read(self, keys: Sequence[KeyReading]) -> Self:
         """Return the distribution with its parameters as numbers, for one key that is a vector or matrix, or for several
         keys that are numbers."""
         first = keys[0]
@@ -203,7 +205,7 @@ class CorrelatedNormal(Relative):
             reading._factor = np.array(sigma)[:, None] * reading._factor
         return reading
 
-    def _each(self, keys: Sequence["KeyReading"], name: str, checked: bool = True) -> tuple[float, ...]:
+    def _each(self, keys: Sequence[KeyReading], name: str, checked: bool = True) -> tuple[float, ...]:
         """Return the parameter `name` for each of several keys, or for each component of one."""
         if len(keys) == 1:
             return keys[0].numbers(name, checked)
@@ -234,7 +236,7 @@ class Rotations(Distribution):
     BOUNDED, DIMS = True, 3
     distribution: Literal["rotations"]
 
-    def _numbers(self, key: "KeyReading") -> dict[str, Any]:
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
         if key.place.shape != (4,):
             allowed = "another, because this is for an attitude as a quaternion"
             raise key.place.refuse("distribution", show(self.distribution), allowed)
@@ -265,7 +267,7 @@ class Shell(Relative):
         """False, because `read` has converted shares to norms."""
         return False
 
-    def _numbers(self, key: "KeyReading") -> dict[str, Any]:
+    def _numbers(self, key: KeyReading) -> dict[str, Any]:
         if key.place.shape != (3,) or key.place.gain is None or key.place.gain.shape != (3,):
             raise key.place.refuse("distribution", '"shell"', "another, because this one is for a vector of three numbers")
         low, high = key.norm("low"), key.norm("high")
@@ -290,14 +292,14 @@ class Shell(Relative):
         return "norm", np.sqrt(sum(np.square(row) for row in rows))
 
 
-def _ordered(key: "KeyReading", low: Sequence[float], high: Sequence[float]) -> dict[str, Any]:
+def _ordered(key: KeyReading, low: Sequence[float], high: Sequence[float]) -> dict[str, Any]:
     """Return the bounds by name. InputError where low is not below high."""
     if not all(a < b for a, b in zip(low, high, strict=True)):
         raise key.place.refuse("low", show(key.table.low), f"below high, which is {show(key.table.high)}")
     return {"low": low, "high": high}
 
 
-def _positive(key: "KeyReading", given: Any, size: int, name: str) -> Array:
+def _positive(key: KeyReading, given: Any, size: int, name: str) -> Array:
     """Return a correlation or covariance matrix (size, size). InputError where it is not symmetric positive definite."""
     allowed = f"{size} rows of {size} plain numbers"
     try:
