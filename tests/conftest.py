@@ -112,7 +112,7 @@ def offer(monkeypatch):
     from starhold.parts import catalogue as parts
 
     def forget():
-        for remembered in (laws._installed, laws._of_body, laws._commands, parts.parts):
+        for remembered in (laws._installed, laws._of_body, laws._commands, parts.parts, parts.alone):
             remembered.cache_clear()
 
     def give(folder, *names):

@@ -1,10 +1,12 @@
 """One kind of scenario with different bodies: how a file's body is known, what is refused, and names that have changed."""
 
 import pytest
+from pydantic import BaseModel
 
 from starhold.errors import InputError
 from starhold.scenario.bodies import bodies
 from starhold.scenario.json_schema import json_schema
+from starhold.scenario.quantity import meaning
 from starhold.scenario.reading import builtin_text, load, make_scenario, open_scenario, parse
 from starhold.scenario.schema import LawTable, ScenarioTable, Timing
 from tests.refusals import refused
@@ -32,6 +34,17 @@ def test_the_bodies_are_found_by_their_folders():
         scenario = parse(body.template, "new.toml")
         assert scenario.body == name
         assert scenario.about(name) is scenario
+
+
+@pytest.mark.parametrize("name", ["rigid-body", "libration-point"])
+def test_a_key_means_what_the_schema_says(name):
+    tables = {type(table) for _, table in parse(bodies()[name].template, "new.toml").table if isinstance(table, BaseModel)}
+    assert len(tables) > 4
+    for table in tables:
+        stated = table.model_json_schema()["properties"]
+        assert {key: meaning(field) for key, field in table.model_fields.items()} == {
+            key: stated[key].get("description", "") for key in table.model_fields
+        }
 
 
 def test_no_two_tables_share_a_name_in_the_schema():

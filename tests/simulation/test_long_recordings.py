@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from starhold.errors import InputError
-from starhold.report.results import BLOCK, write_run
+from starhold.report.netcdf import BLOCK
+from starhold.report.results import write_run
 from starhold.scenario.reading import load
 from starhold.simulation import lane
 from starhold.studies.compare import build, record

@@ -4,8 +4,9 @@ line."""
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from linecache import getlines
+from typing import NamedTuple
 
 from .numbers import Account, RefusedError, demand
 from .reading import BYTES, IS_VALID, Claim, read_certificate
@@ -16,8 +17,7 @@ from .theorems import THEOREMS
 UNREAD = "The programs were not compared with those of a scenario; what stands under 'certificates' was not read."
 
 
-@dataclass(frozen=True)
-class Proved:
+class Proved(NamedTuple):
     """A proved claim, its statement, and the obligations that were checked."""
 
     claim: Claim

@@ -10,7 +10,7 @@ from math import gcd, lcm
 from operator import mul
 from typing import Any, TypeAlias, cast
 
-from .numbers import Account, Rows, demand, rational, read_dict, up, whole
+from .numbers import Account, RefusedError, Rows, demand, rational, read_dict, up, whole
 
 Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
@@ -24,27 +24,21 @@ class Poly:
 
     def __init__(self, terms: Mapping[Monomial, Fraction | int], lower: int = 0) -> None:
         """Take coefficients, or integers over a positive number."""
-        numbers, below = (cast(Collection[int], terms.values()), lower) if lower else whole([*terms.values()])
+        numbers, below = (cast("Collection[int]", terms.values()), lower) if lower else whole([*terms.values()])
         common = gcd(below, *numbers)
-        self.upper = {m: c // common if common > 1 else c for m, c in zip(terms, numbers, strict=True) if c}
-        self.lower = below // common
-        self._slopes = dict[str, Poly]()
-        demand(len(self.upper) <= TERMS, "a polynomial is too long")
+        upper = {m: c // common for m, c in zip(terms, numbers, strict=True) if c}
+        self.upper, self.lower = upper, below // common
+        self.degree = max(map(len, upper)) if upper else 0
+        """The largest number of factors in a term."""
+        self.bits = max(map(abs, (self.lower, *upper.values()))).bit_length()
+        """The bit length of the longest integer."""
+        if len(upper) > TERMS:
+            raise RefusedError("a polynomial is too long")
 
     @cached_property
     def terms(self) -> dict[Monomial, Fraction]:
         """Return the coefficients by monomial."""
         return {m: Fraction(c, self.lower) for m, c in self.upper.items()}
-
-    @cached_property
-    def degree(self) -> int:
-        """Return the largest number of factors in a term."""
-        return max(map(len, self.upper), default=0)
-
-    @cached_property
-    def bits(self) -> int:
-        """Return the bit length of the longest integer."""
-        return max(map(int.bit_length, (self.lower, *self.upper.values())))
 
     def __add__(self, other: Poly | Fraction | int) -> Poly:
         return total((self, poly(other)))
@@ -53,9 +47,9 @@ class Poly:
         other = poly(other)
         Account.spend(len(self.upper) * len(other.upper) + 1, self.bits + other.bits)
         demand(self.degree + other.degree <= DEGREE, "a degree is too high")
-        upper = dict[Monomial, int]()
+        upper: dict[Monomial, int] = {}
         for (m, c), (n, d) in product(self.upper.items(), other.upper.items()):
-            both = tuple(sorted(m + n)) if n else m
+            both = tuple(sorted(m + n)) if m and n else m or n
             upper[both] = upper.get(both, 0) + c * d
         return Poly(upper, self.lower * other.lower)
 
@@ -85,6 +79,10 @@ class Poly:
     def only(self, wanted: Callable[[Monomial], bool]) -> Poly:
         """Return the terms with the wanted monomials."""
         return Poly({m: c for m, c in self.upper.items() if wanted(m)}, self.lower)
+
+    @cached_property
+    def _slopes(self) -> dict[str, Poly]:
+        return {}
 
     def slope(self, name: str) -> Poly:
         """Return the derivative with respect to a variable."""
@@ -117,7 +115,7 @@ class Poly:
 
 def poly(value: Poly | Fraction | int) -> Poly:
     """Return a number as a polynomial."""
-    return value if isinstance(value, Poly) else Poly({(): Fraction(value)})
+    return value if isinstance(value, Poly) else Poly({(): value.numerator}, value.denominator)
 
 
 def var(name: str) -> Poly:
@@ -133,9 +131,11 @@ def variables(letter: str, first: int = 1, last: int = 3) -> list[Poly]:
 def total(parts: Iterable[Poly]) -> Poly:
     """Return a sum."""
     parts = list(parts)
-    lower, upper = lcm(*(part.lower for part in parts)), dict[Monomial, int]()
+    upper: dict[Monomial, int] = {}
+    lower = lcm(*[part.lower for part in parts])
+    bits = lower.bit_length()
     for part in parts:
-        Account.spend(len(part.upper) + 1, max(part.bits, lower.bit_length()))
+        Account.spend(len(part.upper) + 1, max(part.bits, bits))
         scale = lower // part.lower
         for m, c in part.upper.items():
             upper[m] = upper.get(m, 0) + c * scale

@@ -7,10 +7,9 @@ import json
 import operator as op
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from .numbers import Account, demand, rational, read_list, read_table
 from .polynomials import Monomial, Poly, multiple, poly, var
@@ -24,8 +23,7 @@ STEPS, CASES = 20_000, 2_000
 _NAME = re.compile(r"[A-Za-z_]\w*(\.\w+)*", re.ASCII)
 
 
-@dataclass(frozen=True)
-class Program:
+class Program(NamedTuple):
     """A program has named inputs, steps, each an operation and the indices of earlier values (or a constant), and the
     indices of its outputs. The reader checks that a step uses only existing values, and numbers where it needs numbers."""
 
@@ -82,8 +80,7 @@ Guards: TypeAlias = frozenset[tuple[Condition, bool]]
 """Polynomials, as their sorted terms, that are positive (True) or not (False) where a case holds."""
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(NamedTuple):
     """A case is a value, a polynomial or a truth, valid where its guards hold."""
 
     guards: Guards
@@ -140,6 +137,8 @@ def joined(values: Iterable[Piecewise], most: int = CASES) -> Piecewise:
 def contradictory(guards: Guards) -> bool:
     """Tell whether a condition must both hold and fail, or two opposite ones must hold."""
     Account.spend(1 + len(guards))
+    if not guards:
+        return False
     against = {(p, False) for p, truth in guards if truth}
     against |= {(tuple((m, -c) for m, c in p), True) for p, truth in guards if truth}
     return not against.isdisjoint(guards)

@@ -128,6 +128,14 @@ def _of_body(body: str) -> dict[str, Law]:
     return {name: law for name, law in _installed().items() if law.body == body}
 
 
+def find(body: str, name: str) -> Law | None:
+    """Return the installed law of this name for a body; None if there is none. No other law is loaded for it."""
+    # Once all are loaded, laws from files may be listed among them.
+    known = _installed.cache_info().currsize > 0
+    law = None if known else parts.own_part(starhold.laws.__name__, name, as_law)
+    return law if law is not None and law.body == body else catalogue(body).get(name)
+
+
 @contextmanager
 def adopted(law: Law) -> Generator[None]:
     """Inside this context, list a law from a file among the laws for its body."""
@@ -147,14 +155,14 @@ _FROM_FILES: dict[str, Law] = {}
 
 def known_law(name: str) -> Law | None:
     """Return the attitude law of this name: the installed one, else the one last read from a file of this name."""
-    law = catalogue().get(name, _FROM_FILES.get(name))
+    law = find("rigid-body", name) or _FROM_FILES.get(name)
     return law if law is None or law.body == "rigid-body" else None
 
 
 def file_of(name: str) -> Path | None:
     """Return the file from which the law of this name was last read; None for an installed law."""
-    law = None if name in _installed() else _FROM_FILES.get(name)
-    return None if law is None else law.file
+    law = _FROM_FILES.get(name)
+    return None if law is None or name in _installed() else law.file
 
 
 def from_file(path: Path, known: Mapping[str, Law] | None = None) -> Law:

@@ -76,6 +76,8 @@ _BODIES: dict[str, Part] = {}
 def find(role: str, name: str) -> Part:
     """Return the installed part of this role and name, or the body of this name from a file. Raise KeyError if there is
     none."""
+    if (part := own_part(PACKAGES[role], name, as_part)) is not None:
+        return part
     installed = parts(role)
     return _BODIES[name] if role == "body" and name not in installed else installed[name]
 
@@ -123,7 +125,7 @@ def entries(group: str) -> EntryPoints:
 def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str, AnyPart]:
     """Return the parts of a role by name: those in `package`, and those that other packages offer."""
     modules = pkgutil.iter_modules(import_module(package).__path__, f"{package}.")
-    collected = [make(import_module(entry.name)) for entry in modules if _declares_card(entry.name)]
+    collected = [part for entry in modules if (part := _of_module(entry.name, make)) is not None]
     for point in entries("starhold.parts"):
         try:
             module = _loaded(point)
@@ -147,6 +149,26 @@ def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str
         for point in entries("starhold.laws"):
             _leave_out(point.value, ValueError("its entry point is called starhold.laws, now starhold.parts"))
     return {part.name: part for part in sorted(collected, key=lambda part: part.name)}
+
+
+def own_part(package: str, name: str, make: Callable[..., AnyPart]) -> AnyPart | None:
+    """Return starhold's own part of this name, of whose package no other module is loaded; None where there is none, or
+    where other packages offer parts: then all are loaded, because some may have to be left out."""
+    word = name.replace("-", "_")
+    part = _of_module(f"{package}.{word}", make) if word.isidentifier() and alone() else None
+    return part if part is not None and part.name == name else None
+
+
+@cache
+def alone() -> bool:
+    """Tell whether no other package offers parts."""
+    return not (entries("starhold.parts") or entries("starhold.laws"))
+
+
+@cache
+def _of_module(name: str, make: Callable[..., AnyPart]) -> AnyPart | None:
+    """Return the part in a module of this name, which is made once; None where it has no card."""
+    return make(import_module(name)) if _declares_card(name) else None
 
 
 def _loaded(point: Any) -> ModuleType:

@@ -22,7 +22,6 @@ from starhold.report.proved import section as proved
 from starhold.report.settings import settings, with_units
 from starhold.report.tables import note
 from starhold.report.text import pretty_unit
-from starhold.scenario.checking import read_toml
 from starhold.scenario.quantity import LEAST, MOST, declared
 from starhold.scenario.reading import Scenario
 from starhold.studies.flight import Flight
@@ -106,7 +105,7 @@ def _declared(scenario: Scenario, key: str) -> Gain:
 def _written(scenario: Scenario, key: str, value: Any) -> str:
     """Return the text in the file of a key of the scenario's own tables, if it has a unit; else ""."""
     table, _, name = key.partition(".")
-    return with_units(read_toml(scenario.text, scenario.where).get(table, {}).get(name), value)
+    return with_units(scenario.raw.get(table, {}).get(name), value)
 
 
 def _law(law: Reflown) -> dict[str, Any]:

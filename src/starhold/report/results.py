@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import re
@@ -11,14 +10,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-
 from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.certification.certificate import KERNEL, kernel_bundle
 from starhold.certification.certificate import write as write_certificates
 from starhold.errors import InputError
 from starhold.files import atomic_write, claim, clear_unfinished, write_text
 from starhold.report import commands
+from starhold.report.netcdf import write_netcdf
 from starhold.scenario.checking import cut
 from starhold.scenario.reading import LONGEST_PATH
 from starhold.version import __version__
@@ -233,55 +231,3 @@ def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path, d
 
     write_text(folder / PAGE, render(scenario, flights))
     return folder / PAGE
-
-
-BLOCK = 65_536
-"""The number of samples copied at a time."""
-
-
-class _Sink(io.FileIO):
-    """A file that stores a write error and lets the writer continue, because the HDF5 library does not survive an error
-    while closing a file."""
-
-    failure: OSError | None = None
-
-    def write(self, data: Any) -> int:
-        whole, done = memoryview(data).cast("B"), 0
-        try:
-            while self.failure is None and done < len(whole):
-                done += super().write(whole[done:])
-        except OSError as error:
-            self.failure = error
-        return len(whole)
-
-    def truncate(self, size: int | None = None) -> int:
-        try:
-            return super().truncate(size)
-        except OSError as error:
-            self.failure = self.failure or error
-            return size or 0
-
-
-def write_netcdf(run: Recording, path: Path) -> None:
-    """Write a run as a new file. OSError if it cannot be written."""
-    # Imported here, where it is needed; not xarray, which takes longer to load than most flights.
-    import h5netcdf
-    import h5py
-
-    variables, coordinates = run.variables()
-    with _Sink(path, "w+b") as sink:
-        with h5netcdf.File(sink, "w") as file:
-            for name, values in (coordinates | variables).items():
-                data = np.asarray(values.data)
-                for dimension, size in zip(values.dimensions, data.shape, strict=True):
-                    if dimension not in file.dimensions:
-                        file.dimensions[dimension] = size
-                text = data.dtype.kind == "U"
-                made = file.create_variable(name, values.dimensions, h5py.string_dtype() if text else data.dtype)
-                for first in range(0, len(data), BLOCK):
-                    part = data[first : first + BLOCK]
-                    made[first : first + len(part)] = part.astype(object) if text else part
-                made.attrs.update(values.attrs)
-            file.attrs.update(run.attrs)
-        if sink.failure is not None:
-            raise sink.failure

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from starhold.report.tables import listed, titled
 from starhold.report.text import number_text, pretty_unit
-from starhold.scenario.checking import read_toml
+from starhold.scenario.quantity import meaning
 
 if TYPE_CHECKING:
     from starhold.parts.part import Fitted
@@ -24,7 +24,7 @@ MANY = 9
 def settings(scenario: Scenario) -> str:
     """Return all tables of a scenario as HTML, including those of its parts."""
     parts: list[str] = []
-    written = read_toml(scenario.text, scenario.where)
+    written = scenario.raw
     shared = {key: scenario.table.shared[key] for key in _taken(scenario)}
     for name in type(scenario.table).model_fields:
         table = getattr(scenario.table, name)
@@ -50,11 +50,10 @@ def _taken(scenario: Scenario) -> set[str]:
 
 
 def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> str:
-    """Return one table of the scenario with the descriptions of its schema, and numbers with units as in the file; keys
+    """Return one table of the scenario with the descriptions of its keys, and numbers with units as in the file; keys
     without a value are left out, unless parts supply a default."""
-    properties = type(table).model_json_schema()["properties"]
     rows: list[tuple[str, ...]] = []
-    for key in type(table).model_fields:
+    for key, field in type(table).model_fields.items():
         value, given = getattr(table, key), ""
         if value is None and shared.get(f"{name}.{key}") not in (None, 0, math.inf):
             value, given = shared[f"{name}.{key}"], ", by default"
@@ -65,8 +64,8 @@ def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> st
                     text = with_units(texts.get(name_within), number) or _value(number)
                     rows.append((f"{key}.{name_within}", text, ""))
         elif value is not None:
-            meaning = pretty_unit(str(properties.get(key, {}).get("description", "")))
-            rows.append((key, (with_units(written.get(key), value) or _value(value)) + given, meaning))
+            text = (with_units(written.get(key), value) or _value(value)) + given
+            rows.append((key, text, pretty_unit(meaning(field))))
     return titled(name.replace("_", " "), listed(rows))
 
 

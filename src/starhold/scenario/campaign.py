@@ -1,8 +1,6 @@
 """The [campaign] table of a scenario: distributions of keys, and the number of runs. Parameters in the unit of another key,
 such as the bounds of a distribution, stay as in the file; the package `campaign` converts them."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator

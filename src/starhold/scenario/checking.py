@@ -104,15 +104,13 @@ def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
     return [(f"law[{number}]", item) for number, item in enumerate(cast(list[Any], laws), 1)]
 
 
-def pick_law(
-    data: Any, known: Mapping[str, Law], body: str, folder: Path, where: str, key: str
-) -> tuple[dict[str, Any], Law, str | None]:
-    """Return a law's raw table with its type filled in, the law of that type or from the table's `file` (relative to
-    `folder`), and the design form or None; known: the installed laws for the body of this name."""
+def pick_law(data: Any, body: Body, folder: Path, where: str, key: str) -> tuple[dict[str, Any], Law, str | None]:
+    """Return the raw table of a law for a body with its type filled in, the law of that type or from the table's `file`
+    (relative to `folder`), and the design form or None."""
     if not isinstance(data, dict):
         raise InputError(where, key, show(data), "a [[law]] table")
     table = cast(dict[str, Any], data)
-    law = _law_of(table, known, where, key) if "file" not in table else _law_in(table, known, body, folder, where, key)
+    law = _law_in(table, body, folder, where, key) if "file" in table else _law_of(table, body, where, key)
     table = {name: value for name, value in table.items() if name != "file"} | {"type": law.name}
     form = table.get("form")
     if form is not None and (not isinstance(form, str) or form not in law.forms):
@@ -137,20 +135,22 @@ def _refuse_other_way(law: Law, form: str | None, name: str, where: str, key: st
         raise InputError(where, key, given, f"form = {' or '.join(others)} in the same table")
 
 
-def _law_of(table: dict[str, Any], known: Mapping[str, Law], where: str, key: str) -> Law:
+def _law_of(table: dict[str, Any], body: Body, where: str, key: str) -> Law:
     name = table.get("type")
-    if not isinstance(name, str) or name not in known:
-        allowed = nearest(name, list(known)) if isinstance(name, str) else f"{nearest('', list(known))}; or a file"
+    law = body.law(name) if isinstance(name, str) else None
+    if law is None:
+        known = list(body.laws())
+        allowed = nearest(name, known) if isinstance(name, str) else f"{nearest('', known)}; or a file"
         allowed = allowed if known else "a file, because no law for this body is installed"
         raise InputError(where, f"{key}.type", show(name) if name is not None else "nothing", allowed)
-    return known[name]
+    return law
 
 
-def _law_in(table: dict[str, Any], known: Mapping[str, Law], body: str, folder: Path, where: str, key: str) -> Law:
+def _law_in(table: dict[str, Any], body: Body, folder: Path, where: str, key: str) -> Law:
     def read(path: Path) -> Law:
-        law = from_file(path, known)
-        if law.body != body:
-            raise ValueError(f"a law for the body {law.body}, not for {body}")
+        law = from_file(path, body.laws())
+        if law.body != body.name:
+            raise ValueError(f"a law for the body {law.body}, not for {body.name}")
         return law
 
     return in_file(table, read, "law", folder, where, key)

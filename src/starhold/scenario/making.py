@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from starhold.errors import InputError
-from starhold.scenario.checking import nearest, read_toml, show
+from starhold.scenario.checking import nearest, show
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -30,14 +30,13 @@ def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
 def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[Scenario]:
     """Yield the scenario with each set of changes in turn; errors name the changes."""
     names = names_of(scenario)
-    tables = read_toml(scenario.text, scenario.where)
     for change in changes:
         # To fit on one line, errors show only the first of many changes.
         described = ", ".join(f"{key} = {show(value)}" for key, value in list(change.items())[:4])
         described = " ".join(described.split()).encode(errors="backslashreplace").decode()
         where = f"{scenario.where} with {described}" if described else scenario.where
         try:
-            other = deepcopy(tables)
+            other = deepcopy(scenario.raw)
             for key, value in change.items():
                 _put(other, path_of(key, names, where), deepcopy(value), where, scenario.table)
             yield scenario._of(plain(other, where, ""))  # pyright: ignore[reportPrivateUsage]

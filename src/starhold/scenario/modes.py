@@ -52,7 +52,7 @@ def read_gains(
     """Return the law of a raw table, called `key` in errors, for a scenario without laws as yet. base: the model of the keys
     besides gains, by default the body's; whole: the validated table that holds these keys instead, for a mode's table."""
     body, where, craft = scenario.hooks, scenario.where, scenario.craft
-    table, law, form = pick_law(data, body.laws(), body.name, scenario.folder, where, key)
+    table, law, form = pick_law(data, body, scenario.folder, where, key)
     declared, shared = law.fields(form), scenario.table.shared
     refuse_own(table, declared, shared, where, key)
     extra = ["file", *(["form"] if law.forms else [])]

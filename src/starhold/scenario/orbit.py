@@ -1,12 +1,10 @@
 """The [orbit] table, with position and velocity or elements, and the checks of the orbit."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Self, cast
 
 from pydantic import BeforeValidator, WithJsonSchema, model_validator
 
@@ -146,7 +144,7 @@ class Orbit(Table):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _in_metres(cls, given: Any, read: Callable[[Any], Orbit]) -> Orbit:
+    def _in_metres(cls, given: Any, read: Callable[[Any], Self]) -> Self:
         orbit, altitude = read(given), cast(Any, given).get("altitude") if isinstance(given, dict) else None
         if isinstance(altitude, int | float) and orbit.surface is not None and altitude < LOWEST * orbit.surface:
             low = f"{LOWEST * orbit.surface:.6g} or more about this body"
@@ -161,7 +159,7 @@ class Orbit(Table):
         return orbit
 
     @model_validator(mode="after")
-    def _told_once(self) -> Orbit:
+    def _told_once(self) -> Self:
         sizes = [key for key in ("altitude", "semi_major_axis") if getattr(self, key) is not None]
         elements = [key for key in ("eccentricity", *ANGLES) if getattr(self, key) is not None]
         if self.position is not None or self.velocity is not None:
@@ -185,7 +183,7 @@ class Orbit(Table):
         return self
 
     @model_validator(mode="after")
-    def _possible(self) -> Orbit:
+    def _possible(self) -> Self:
         check_gravity("gravitational_parameter", self.gravitational_parameter)
         try:
             start = self.start

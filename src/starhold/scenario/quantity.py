@@ -46,6 +46,13 @@ def declared(field: FieldInfo) -> Gain | None:
     return next((item for item in field.metadata if isinstance(item, Gain)), None)
 
 
+def meaning(field: FieldInfo) -> str:
+    """Return the description of a table's key, with its unit; "" where it has none. It is that of the JSON Schema, which
+    takes longer to make."""
+    schemas = (item.json_schema or {} for item in field.metadata if isinstance(item, WithJsonSchema))
+    return field.description or next((schema.get("description", "") for schema in schemas), "")
+
+
 def quantity_or(word: str, meaning: float, gain: Gain) -> Annotations:
     """Return the annotations for a quantity, or for a word that stands for a value of it."""
     read, schema = reader(gain), _schema(gain)

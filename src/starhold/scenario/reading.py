@@ -85,6 +85,11 @@ class Scenario:
         return self.hooks.name
 
     @cached_property
+    def raw(self) -> Mapping[str, Any]:
+        """The raw tables of its text."""
+        return read_toml(self.text, self.where)
+
+    @cached_property
     def made(self) -> Made:
         """The numbers that the tables define. InputError where they are physically impossible."""
         return self.hooks.make(self.table, self.where)

@@ -1,12 +1,10 @@
 """The [[requirement]] tables of a scenario: requirements on a flight and their methods of verification. Limits are in the
 unit of their metric, so they stay as in the file; `studies.requirements` converts them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, TypeAlias, cast
+from typing import Annotated, Any, Literal, Self, TypeAlias, cast
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -77,7 +75,7 @@ class RequirementTable(Table):
     attributes: dict[str, str] = Field(default={}, description="attributes of another tool, kept unchanged")
 
     @model_validator(mode="after")
-    def _has_a_metric(self) -> RequirementTable:
+    def _has_a_metric(self) -> Self:
         if self.metric is None and self.method not in (None, "inspection"):
             raise at_key("metric", f'this key, required with method = "{self.method}"', None)
         if self.metric is None and self.id is None:
@@ -85,7 +83,7 @@ class RequirementTable(Table):
         return self
 
     @model_validator(mode="after")
-    def _has_a_cone(self) -> RequirementTable:
+    def _has_a_cone(self) -> Self:
         for key in ("axis", "direction"):
             value = getattr(self, key)
             if (self.metric == CONE) != (value is not None):
@@ -96,7 +94,7 @@ class RequirementTable(Table):
         return self
 
     @model_validator(mode="after")
-    def _can_be_decided(self) -> RequirementTable:
+    def _can_be_decided(self) -> Self:
         if self.at_most is not None and self.at_least is not None:
             raise at_key("at_least", "either at_most or at_least; a range is two requirements", self.at_least)
         for key in ("share", "confidence"):

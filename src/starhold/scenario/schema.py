@@ -1,12 +1,10 @@
 """The tables common to the scenarios of all bodies, and those of laws."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from functools import cache, reduce
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, create_model, model_validator
 
@@ -40,7 +38,7 @@ class ScenarioTable(Table):
     """The keys that set a number of all parts that declare it as `shared`, with their defaults."""
 
     @model_validator(mode="after")
-    def _requirements_fit(self) -> ScenarioTable:
+    def _requirements_fit(self) -> Self:
         check_family(self.requirement)
         return self
 
@@ -71,7 +69,7 @@ class Timing(Table):
     record_every: Annotated[int, *quantity(Gain("1", at_least=1, whole=True, text="control steps per recorded sample"))] = 1
 
     @model_validator(mode="after")
-    def _fits(self) -> Timing:
+    def _fits(self) -> Self:
         if self.control_period > self.duration:
             raise at_key("control_period", f"at most the duration, {self.duration:g}{self.unit}", self.control_period)
         if not self.duration / self.control_period <= MOST_STEPS:
@@ -104,7 +102,7 @@ class SeededTiming(Timing):
     ] = 0
 
     @model_validator(mode="after")
-    def _whole_steps(self) -> SeededTiming:
+    def _whole_steps(self) -> Self:
         count = self.duration / self.control_period
         if abs(count - round(count)) > 1e-6:
             raise at_key(

@@ -11,7 +11,8 @@ from starhold.parts.contract import Field as Parameter
 
 
 class Table(BaseModel):
-    """A table that refuses unknown keys."""
+    """A table that refuses unknown keys. Modules of tables do without `from __future__ import annotations` where they can:
+    Pydantic would evaluate each annotation anew from its text."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 

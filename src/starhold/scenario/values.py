@@ -16,7 +16,7 @@ from starhold.laws.interface import Gain
 from starhold.laws.modes import Modes, mode_laws
 from starhold.laws.monitors import Monitor
 from starhold.parts.part import Fitted
-from starhold.scenario.checking import cut, nearest, read_toml, show
+from starhold.scenario.checking import cut, nearest, show
 from starhold.scenario.making import names_of, path_of
 from starhold.scenario.modes import CONDITIONS, Condition, ModeTable
 from starhold.scenario.parts import part_model
@@ -165,7 +165,7 @@ def _locate(scenario: Scenario, key: str, path: tuple[str | int, ...]) -> Place:
         raise _no("a whole table", f"keys of it, such as {key}.KEY")
     if gain is not None and gain.columns:
         raise _no("rows of a table", "a key of a number, a vector or a word")
-    tables = read_toml(scenario.text, scenario.where)
+    tables = scenario.raw
     value, shape = _formed(gain, _plainly(gain, value), _raw_at(tables, path))
     if rest:
         value, shape = _component(value, shape, rest), ()

@@ -144,6 +144,9 @@ class NamedByTable:
     def laws(self) -> Mapping[str, Law]:
         return {}
 
+    def law(self, name: str) -> Law | None:
+        return None
+
     def chosen(self, tables: Mapping[str, Any], where: str, folder: Path) -> AnyBody:
         table = tables[MARKER]
         if not isinstance(table, dict):

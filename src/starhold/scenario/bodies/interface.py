@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from starhold.errors import InputError
-from starhold.laws.catalogue import Law, catalogue
+from starhold.laws.catalogue import Law, catalogue, find
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.part import Fitted
 
@@ -78,6 +78,10 @@ class Body(Protocol):
     def laws(self) -> Mapping[str, Law]:
         """The installed laws by name."""
         return catalogue(self.name)
+
+    def law(self, name: str) -> Law | None:
+        """Return the installed law of this name; None if there is none."""
+        return find(self.name, name)
 
     def context(self, tables: Mapping[str, Any], where: str) -> Any:
         """Return the context in which raw tables and gains are validated, such as the units of scaled numbers. InputError

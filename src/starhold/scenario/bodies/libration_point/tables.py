@@ -1,9 +1,7 @@
 """The tables of a station-keeping scenario. Plain numbers are scaled: by the unit of length, and one revolution takes 2
 pi."""
 
-from __future__ import annotations
-
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
@@ -44,7 +42,7 @@ class LibrationTable(Table):
     )
 
     @model_validator(mode="after")
-    def _bodies(self) -> LibrationTable:
+    def _bodies(self) -> Self:
         given = {"larger": self.larger, "smaller": self.smaller, "separation": self.separation}
         missing = [key for key, value in given.items() if value is None]
         if self.primaries is not None and len(missing) < len(given):
@@ -108,7 +106,7 @@ class Resources(Table):
         return {key: value for key, value in given.items() if value is not None}
 
     @model_validator(mode="after")
-    def _one_limit(self) -> Resources:
+    def _one_limit(self) -> Self:
         if len(self.limits) > 1:
             raise at_key(list(self.limits)[1], f"one of limit, margin and deficit, not also {next(iter(self.limits))}", None)
         return self
@@ -166,7 +164,7 @@ class LibrationPointTable(ScenarioTable):
     settling: Near = Near()
 
     @model_validator(mode="after")
-    def _limit_is_of_something(self) -> LibrationPointTable:
+    def _limit_is_of_something(self) -> Self:
         if self.control.limit_kind == "none" and self.control.limits:
             raise at_key("control.limit_kind", "norm or axis where there is a limit", "none")
         return self

@@ -1,11 +1,9 @@
 """The tables of a rigid-body scenario as pydantic models. Each field has its units and bounds."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -60,7 +58,7 @@ class BudgetTable(Table):
         return without_requirements(given, "budget")
 
     @model_validator(mode="after")
-    def _has_a_direction(self) -> BudgetTable:
+    def _has_a_direction(self) -> Self:
         if self.boresight is not None and not any(self.boresight):
             raise at_key("boresight", "a direction that is not zero", list(self.boresight))
         return self
@@ -110,7 +108,7 @@ class Pointing(Table):
     angles: Annotated[Any, *quantity(ANGLES)] = None
 
     @model_validator(mode="after")
-    def _one_attitude(self) -> Pointing:
+    def _one_attitude(self) -> Self:
         if self.attitude is not None and self.angles is not None:
             raise at_key("angles", "either attitude or angles, not both", list(self.angles))
         try:
@@ -146,7 +144,7 @@ class TargetTable(Pointing):
     ] = None
 
     @model_validator(mode="after")
-    def _fits_mode(self) -> TargetTable:
+    def _fits_mode(self) -> Self:
         if (self.mode == "history") != (self.file is not None):
             raise at_key("file", 'a file exactly when mode = "history"', self.file)
         if self.mode != "inertial" and (self.attitude is not None or self.angles is not None):
@@ -245,7 +243,7 @@ class Rotor(Table):
     mounting_error: Annotated[Any, *quantity(replace(MOUNTING, text=TURNED))] = None
 
     @model_validator(mode="after")
-    def _one_of_each(self) -> Rotor:
+    def _one_of_each(self) -> Self:
         for speed, momentum in (("top_speed", "momentum_limit"), ("speed", "momentum")):
             if getattr(self, speed) is not None and momentum in self.model_fields_set:
                 raise at_key(speed, f"either {speed} or {momentum}, not both", getattr(self, speed))
@@ -296,7 +294,7 @@ class FaultTable(Table):
         return self.lost or any(value is not None for value in changed)
 
     @model_validator(mode="after")
-    def _does_something(self) -> FaultTable:
+    def _does_something(self) -> Self:
         if not self.strikes_wheel and (self.wheel is not None or self.inertia is None):
             body = "" if self.inertia is not None else ", or a new inertia of the body without a wheel"
             raise at_key("lost", f"true, or a new torque_limit, momentum_limit, viscous or coulomb{body}", False)
@@ -357,14 +355,14 @@ class RigidBodyTable(ScenarioTable):
     SHARED = MappingProxyType({"orbit.epoch": START, "orbit.ephemeris": 0, "spacecraft.mass": math.inf})
 
     @model_validator(mode="after")
-    def _wheels_have_axes(self) -> RigidBodyTable:
+    def _wheels_have_axes(self) -> Self:
         layout = None if self.wheels is None else self.wheels.layout
         if (layout is None) == (not self.wheel) and (self.wheels is not None or self.wheel):
             raise at_key("wheels.layout", "either a layout or [[wheel]] tables", layout)
         return self
 
     @model_validator(mode="after")
-    def _has_orbit(self) -> RigidBodyTable:
+    def _has_orbit(self) -> Self:
         if self.orbit is None and self.environment.gravity_gradient:
             raise at_key("environment.gravity_gradient", "false without an [orbit] table", True)
         if self.orbit is None and self.target.mode == "orbital":
@@ -374,7 +372,7 @@ class RigidBodyTable(ScenarioTable):
         return self
 
     @model_validator(mode="after")
-    def _has_volume(self) -> RigidBodyTable:
+    def _has_volume(self) -> Self:
         body = self.spacecraft
         if body.mass is not None and body.mass > (most := heaviest(body.inertia)):
             allowed = f"at most {most:.3g} kg: with this inertia more would be denser than any metal; is another unit meant?"

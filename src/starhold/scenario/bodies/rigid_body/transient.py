@@ -1,11 +1,9 @@
 """The [transient] table: the limits of a slew, and the search for the closed-loop root that slews fastest within them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, Self, cast
 
 from pydantic import BeforeValidator, WithJsonSchema, model_validator
 
@@ -103,7 +101,7 @@ class TransientTable(Table):
         return (x, y, z)
 
     @model_validator(mode="after")
-    def _possible(self) -> TransientTable:
+    def _possible(self) -> Self:
         size = math.hypot(*self.axis)
         if not 0.0 < size < math.inf:
             raise at_key("axis", "a direction that is not zero", list(self.axis))
