@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
-from math import inf, pi
+from math import inf, isfinite, pi
 from typing import Any, cast
 
 import numpy as np
 
 from starhold.algebra.quaternion import multiply, normalise, to_body
+from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, subtract, unit
 from starhold.certification.measured import bounded
-from starhold.certification.unmodelled import COMMANDED, envelope_of
-from starhold.conformance.bench import PERIOD, Jumping, any_attitude, anywhere, loop_with, momentum_of, moving
+from starhold.certification.unmodelled import COMMANDED, envelope_of, is_read
+from starhold.conformance.bench import (
+    PERIOD,
+    Jumping,
+    any_attitude,
+    anywhere,
+    loop_with,
+    momentum_of,
+    moving,
+    random_measurements,
+)
 from starhold.conformance.directions import field_at, misdirected, tells, turn_between
 from starhold.conformance.motions import moves_as_it_says, pulls_as_it_says
 from starhold.conformance.verdicts import STEPS, NotApplicableError, require
@@ -26,6 +37,8 @@ from starhold.simulation.lane import fly
 
 LATER = 720720
 """So many control steps are a multiple of all numbers of up to 16."""
+FEW, LONG = 4, 1000
+"""Commands and starts of flights that are tried, and the control steps of a long flight."""
 
 
 def keeps_what_it_says(part: Part) -> None:
@@ -164,14 +177,62 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
                 command.torque,
             )
     if part.role == "effector":
-        for step in (1, 5, STEPS):
-            end = fly(loop, step)[1]
-            effector = end.effectors[[f.part for f in loop.used("effector")].index(part)]
-            if part.hook("bound"):
-                yield "torque", norm(module.reaction(effector, None, end.state, numbers)), most(torque, end.state)
-            if part.hook("error"):
-                torque_wanted = scale(
-                    0.1 * module.sure_torque(numbers, "norm"), cast(Any, tuple(random.uniform(-1, 1, 3).tolist()))
-                )
-                torque_given = module.applied(effector, module.command(torque_wanted, numbers), end.state, numbers)
-                yield "error of the command", norm(subtract(torque_given, torque_wanted)), most(command, end.state)
+        yield from _reactions(fitted, loop, torque, command)
+
+
+def _reactions(fitted: Fitted, loop: ClosedLoop, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:
+    """Yield how far the torque of an effector is from the one that it takes for applied, and this from the command, in
+    flights from some attitudes, with their bounds."""
+    module, numbers, random = cast(Any, fitted.part.module), fitted.prepared(loop.period), np.random.default_rng(7)
+    place, acts = [*loop.used("effector")].index(fitted), fitted.part.flag("ACTS")
+    begun = (state._replace(rate=scale(0.02, state.rate)) for state, *_ in islice(anywhere(loop, random), FEW))
+    for start in (loop.start, *begun):
+        for steps in (1, 5, STEPS, LONG):
+            end = fly(replace(loop, start=start), steps)[1]
+            body = end.state
+            for wanted in _commands(fitted, numbers, random) if acts else (ZERO,):
+                inner, given = _commanded(fitted, numbers, end.effectors[place], wanted, body)
+                applied = module.applied(inner, given, body, numbers) if acts else ZERO
+                if fitted.part.hook("bound"):
+                    besides = subtract(module.reaction(inner, given, body, numbers), applied)
+                    yield "torque", norm(besides), torque.torque + torque.per_rate * norm(body.rate)
+                if fitted.part.hook("error"):
+                    off = norm(subtract(applied, wanted))
+                    yield "error of the command", off, command.torque + command.per_rate * norm(body.rate)
+    if fitted.part.hook("error") and not is_read(loop, fitted):
+        # What it stores must not run out.
+        body, wanted = loop.start, [*_commands(fitted, numbers, random)][-1]
+        inner, given = _commanded(fitted, numbers, loop.carry().effectors[place], wanted, body)
+        for _ in range(5 * LONG):
+            inner = move(inner, loop.period, module.rates(inner, given, body, ZERO, numbers))
+        off = norm(subtract(module.applied(inner, given, body, numbers), wanted))
+        yield "error of a command that is held for long", off, command.torque + command.per_rate * norm(body.rate)
+
+
+def _commands(effector: Fitted, numbers: Any, random: np.random.Generator) -> Iterator[Vector]:
+    """Yield commands (N m) that an effector surely gives, some of the largest; any, if it does not say which."""
+    tell: Any = effector.part.hook("sure_torque")
+    ball, cube = (inf, inf) if tell is None else (tell(numbers, kind) * (1.0 - 1e-9) for kind in ("norm", "axis"))
+    for _ in range(FEW):
+        drawn, size = random.normal(size=3), 10.0 ** random.uniform(-6.0, 0.0)
+        yield _vector(size * min(ball, 1e3) * drawn / np.linalg.norm(drawn))
+        if isfinite(ball):
+            yield _vector(ball * drawn / np.linalg.norm(drawn))
+            yield _vector(min(cube, 1e3) * np.sign(drawn))
+
+
+def _vector(array: Any) -> Vector:
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def _commanded(effector: Fitted, numbers: Any, inner: Any, wanted: Vector, body: Any) -> tuple[Any, Any]:
+    """Return the state of an effector, on a body in its state, and the command that it takes, for a wanted torque (N m)."""
+    module: Any = effector.part.module
+    if not effector.part.flag("ACTS"):
+        return inner, ()
+    if effector.part.hook("switch"):
+        seen = next(random_measurements(1))._replace(attitude=body.attitude, rate=body.rate, body_rate=body.rate)
+        inner = module.switch(inner, wanted, seen, body, numbers, 0)
+        return inner, module.pulse(inner, PERIOD, numbers) if effector.part.hook("pulse") else ()
+    return inner, module.command(wanted, numbers)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
 from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quaternion import to_body
 from starhold.algebra.vector import ZERO, Vector, add, norm, scale, subtract, unit
 from starhold.certification.measured import bounded
-from starhold.conformance.bench import loop_with
-from starhold.conformance.directions import scattered, sky_at, turn_between
+from starhold.conformance.bench import anywhere, loop_with
+from starhold.conformance.directions import inertial_directions, scattered, sky_at, turn_between
 from starhold.conformance.verdicts import NotApplicableError, require
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS, Direction, Noise, Place
@@ -73,22 +75,47 @@ def _scatters(fitted: Fitted, loop: ClosedLoop) -> Iterator[Scatter]:
         turns = np.array(noise.attitude)
         said = {"rate": (noise.rate**2 + walk) * each, "attitude": turns @ turns.T * READINGS}
         said["magnetic_field"] = noise.field**2 * each
-        steps = {"magnetic_field": _steps(errors.field, noise.field)}
-        steps |= {"rate": _steps(errors.rate - errors.bias, noise.rate), "attitude": _steps(errors.attitude, turns.max())}
+        sizes = {"rate": (errors.rate - errors.bias, noise.rate), "attitude": (errors.attitude, turns.max())}
+        sizes["magnetic_field"] = errors.field, noise.field
         for name in said.keys() & {*module.Reading._fields}:
-            yield Scatter(f"error of the {name}", _sums(fitted, loop, name, noise.every), said[name], steps[name])
+            sums = _sums(fitted, loop, name, noise.every)
+            yield Scatter(f"error of the {name}", sums, said[name], _steps(fitted, loop, name, *sizes[name]))
     if part.hook("direction"):
         seen: Direction = module.direction(fitted.params, loop.period, sky_at(fitted.params, loop))
         if isfinite(seen.error):
             sums = _sums(fitted, loop, KINDS[seen.of][0], seen.every, as_direction=True)
-            steps_of = _steps(seen.error, seen.deviation)
-            yield Scatter(f"error of the {seen.of}", sums, seen.deviation**2 * each, steps_of)
+            steps = _steps(fitted, loop, KINDS[seen.of][0], seen.error, seen.deviation, seen.of)
+            yield Scatter(f"error of the {seen.of}", sums, seen.deviation**2 * each, steps)
 
 
-def _steps(error: float, deviation: float) -> float:
-    """Return what noise may add by the steps of a reading, which are a part of its other errors, to their sum over the root
-    of their number: where these errors are not small, twice as much at each reading."""
-    return 2.0 * error * float(np.sqrt(READINGS)) if error > 2.0 * deviation else 0.0
+def _steps(fitted: Fitted, loop: ClosedLoop, name: str, error: float, deviation: float, direction: str = "") -> float:
+    """Return what noise may add by the steps of a reading to the sum of its errors over the root of their number: where
+    these are not small, twice as much at each reading as they differ from those of bias, scale factors and axes. direction:
+    of which kind it is."""
+    if error <= 2.0 * deviation:
+        return 0.0
+    module, numbers = fitted.part.module, fitted.prepared(loop.period)
+    there = inertial_directions(fitted.params, loop.start.position, 0.0)
+    rows = list[tuple[Vector, Vector]]()
+    for state, *_ in islice(anywhere(loop, np.random.default_rng(4)), 2 * FLIGHTS):
+        seen, _ = module.measure(state, fitted.remembered(numbers, state), numbers, Silent(), 0)
+        if not all(getattr(seen, flag, 1.0) > 0.5 for flag in flags_of(name)):
+            continue
+        if name == "attitude":
+            rows.append((ZERO, turn_between(state.attitude, seen.attitude)))
+        elif name == "rate":
+            rows.append((state.rate, seen.rate))
+        else:
+            # A field's direction is that of all of it.
+            size = there["strength"] if name == "magnetic_field" else 1.0
+            rows.append((to_body(state.attitude, there[direction or "field"]), scale(1.0 / size, getattr(seen, name))))
+    if not rows:
+        return 0.0
+    true, shown = (np.array(column) for column in zip(*rows, strict=True))
+    given = np.column_stack([true, np.ones(len(true))])
+    off = float(np.linalg.norm(shown - given @ np.linalg.lstsq(given, shown, rcond=None)[0], axis=1).max())
+    size = there["strength"] if name == "magnetic_field" and not direction else 1.0
+    return 2.0 * size * off * float(np.sqrt(READINGS))
 
 
 def _sums(fitted: Fitted, loop: ClosedLoop, name: str, every: int, as_direction: bool = False) -> Array:
@@ -102,12 +129,17 @@ def _sums(fitted: Fitted, loop: ClosedLoop, name: str, every: int, as_direction:
             seen.append(reading)
         return seen[BEFORE * every :: every]
 
-    still, flags = readings(Silent), (f"{name}_is_new", f"{name}_is_seen")
+    still, flags = readings(Silent), flags_of(name)
     for flight in range(FLIGHTS):
         for quiet, seen in zip(still, readings(lambda step, flight=flight: Dice((1, flight), step, 0)), strict=True):
             if all(getattr(one, flag, 1.0) > 0.5 for one in (seen, quiet) for flag in flags):
                 summed[flight] += _apart(name, getattr(quiet, name), getattr(seen, name), as_direction)
     return summed
+
+
+def flags_of(name: str) -> tuple[str, ...]:
+    """Return the names of readings that tell whether one of this name is there."""
+    return f"{name}_is_new", f"{name}_is_seen"
 
 
 def _apart(name: str, quiet: Any, seen: Any, as_direction: bool) -> Vector:
