@@ -227,6 +227,25 @@ BROKEN = {
         },
         {"errs_as_it_says"},
     ),
+    "noise that grows with the rate": (
+        "star-tracker",
+        {"dice.vector(0, 1.0)": "dice.vector(0, 1.0 + 4.0 * dot(state.rate, state.rate))"},
+        {"draws_as_it_says"},
+    ),
+    "a Sun in the Earth's shadow": (
+        "sun-sensor",
+        {
+            "seen.direction))": "mixed(seen, state)))",
+            "less(0.5, sun.in_view(state.position, seen))": "less(-1.0, params.cosine)",
+            "def measure(": (
+                "def mixed(seen, state):\n"
+                "    away = scale(sun.in_view(state.position, seen) - 1.0, unit(state.position))\n"
+                "    return add(seen.direction, away)\n\n\ndef measure("
+            ),
+            "import ZERO, Vector, add, dot": "import ZERO, Vector, add, scale, dot",
+        },
+        {"keeps_what_it_says"},
+    ),
     "a torque that is not the one that it takes for applied": (
         "jets", {"return applied(state, command, body, params)": "return scale(1.1, command)"}, {"keeps_what_it_says"}
     ),

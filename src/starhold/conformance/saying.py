@@ -25,7 +25,7 @@ from starhold.conformance.bench import (
     moving,
     random_measurements,
 )
-from starhold.conformance.directions import field_at, misdirected, tells, turn_between
+from starhold.conformance.directions import LATER, field_at, misdirected, tells, turn_between
 from starhold.conformance.motions import moves_as_it_says, pulls_as_it_says
 from starhold.conformance.verdicts import STEPS, NotApplicableError, require
 from starhold.loop.closed_loop import ClosedLoop
@@ -35,8 +35,6 @@ from starhold.parts.part import Fitted, Part
 from starhold.parts.random import Dice
 from starhold.simulation.lane import fly
 
-LATER = 720720
-"""So many control steps are a multiple of all numbers of up to 16."""
 FEW, LONG = 4, 1000
 """Commands and starts of flights that are tried, and the control steps of a long flight."""
 
