@@ -227,6 +227,15 @@ BROKEN = {
         },
         {"errs_as_it_says"},
     ),
+    "a drive that does not answer to small changes": (
+        "lag",
+        {
+            "scale(1.0 / params.lag, subtract(target, output))": "tuple(map(slow, subtract(target, output)))",
+            "def rates(": "def slow(x):\n    return where(less(absolute(x), 1e-4), 0.0, x / 0.3)\n\n\ndef rates(",
+            "scalar import Scalar": "scalar import Scalar, absolute, less, where",
+        },
+        {"keeps_what_it_says"},
+    ),
     "noise that grows with the rate": (
         "star-tracker",
         {"dice.vector(0, 1.0)": "dice.vector(0, 1.0 + 4.0 * dot(state.rate, state.rate))"},

@@ -102,9 +102,11 @@ def _follows_as_it_says(part: Part) -> None:
     for params in part.examples():
         numbers, late = Fitted(part, params).prepared(PERIOD), module.late(params, PERIOD)
         require(0.0 <= late.kept < 1.0 and 0.0 < late.mean <= 1.0 and late.most > 0.0, f"{late} is not of what is late")
-        for _ in range(STEPS):
-            target = random.normal(size=3)
-            off = random.uniform(-1.0, 1.0, size=3) * min(late.most, 1.0) * 0.999
+        for place in range(STEPS):
+            # Of all sizes, and now and then about one axis alone.
+            size, shares = 10.0 ** random.uniform(-8.0, 0.0) if place % 2 else 1.0, random.uniform(-1.0, 1.0, size=3)
+            target = size * random.normal(size=3)
+            off = (np.eye(3)[place // 8 % 3] if place % 8 == 7 else shares) * min(late.most, size) * 0.999
             *outputs, wanted = (cast(Vector, tuple(x.tolist())) for x in (target + off, target))
             for _ in range(steps):
                 rate = module.rates(outputs[-1], wanted, outputs[0], PERIOD, numbers)
