@@ -236,6 +236,41 @@ BROKEN = {
         },
         {"keeps_what_it_says"},
     ),
+    "a rate that is not seen if it is small": (
+        "sensor",
+        {
+            "add(state.rate, params.bias)": "add(tuple(map(seen, state.rate)), params.bias)",
+            "def measure": (
+                "def seen(x):\n    return where(less(absolute(x), 1e-5), 0.0, x)\n\n\n"
+                + STAYING.replace("def remember(params, state):\n    return ZERO\n\n\n", "")
+            ),
+            "from starhold.algebra.quantity": (
+                "from starhold.algebra.scalar import absolute, less, where\nfrom starhold.algebra.quantity"
+            ),
+        },
+        {"keeps_what_it_says"},
+    ),
+    "a command that is not obeyed if it is small": (
+        "actuator",
+        {
+            "def examples": "def error(params, envelope):\n    return Push(0.0)\n\n\ndef examples",
+            "Params(1e-4)": "Params(1e-7)",
+            "import Card,": "import Push, Card,",
+        },
+        {"keeps_what_it_says"},
+    ),
+    "a target that turns for some time": (
+        "target",
+        {
+            "ZERO, ZERO)": "(where(less(step, 900), where(less(300, step), 1e-3, 0.0), 0.0), 0.0, 0.0), ZERO)",
+            "def examples": "def motion(params, orbit):\n    return Motion(0.0, 0.0)\n\n\ndef examples",
+            "import Card": "import Motion, Card",
+            "from starhold.algebra.quantity": (
+                "from starhold.algebra.scalar import less, where\nfrom starhold.algebra.quantity"
+            ),
+        },
+        {"keeps_what_it_says"},
+    ),
     "noise that grows with the rate": (
         "star-tracker",
         {"dice.vector(0, 1.0)": "dice.vector(0, 1.0 + 4.0 * dot(state.rate, state.rate))"},

@@ -170,7 +170,7 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
                     2.0 * (errors.rate - errors.bias) + grown + at_first,
                 )
         elif part.role == "actuator" and part.hook("command"):
-            torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
+            torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-9, 0), size=3).tolist())
             yield (
                 "error of the command",
                 norm(subtract(module.command(torque_wanted, numbers), torque_wanted)),
@@ -214,7 +214,7 @@ def _commands(effector: Fitted, numbers: Any, random: np.random.Generator) -> It
     tell: Any = effector.part.hook("sure_torque")
     ball, cube = (inf, inf) if tell is None else (tell(numbers, kind) * (1.0 - 1e-9) for kind in ("norm", "axis"))
     for _ in range(FEW):
-        drawn, size = random.normal(size=3), 10.0 ** random.uniform(-6.0, 0.0)
+        drawn, size = random.normal(size=3), 10.0 ** random.uniform(-9.0, 0.0)
         yield _vector(size * min(ball, 1e3) * drawn / np.linalg.norm(drawn))
         if isfinite(ball):
             yield _vector(ball * drawn / np.linalg.norm(drawn))
