@@ -154,6 +154,20 @@ BROKEN = {
         },
         {"keeps_what_it_says"},
     ),
+    "a torque that changes faster elsewhere on the orbit": (
+        "environment",
+        {
+            "def torque": (
+                "def torque_change(params, craft, envelope):\n"
+                "    return Push(1e-4 * params.drag, 0.503 * params.drag)\n\n\ndef torque"
+            ),
+            "import Card, Parameter": "import Card, Parameter, Push",
+            "scale(-params.drag, state.rate)": (
+                "scale(params.drag * 4.9e13 / dot(state.position, state.position), state.attitude[1:])"
+            ),
+        },
+        {"keeps_what_it_says"},
+    ),
     "a target that turns faster than it says": (
         "target",
         {

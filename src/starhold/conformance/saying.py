@@ -83,17 +83,23 @@ def _changes(part: Part, loop: ClosedLoop, change: Push) -> Iterator[tuple[str, 
     memory = module.remember(numbers) if part.hook("remember") else None
     for rate in (ZERO, *(cast(Any, tuple(x)) for x in random.normal(size=(STEPS, 3)).tolist())):
         for _ in range(STEPS):
-            attitude = any_attitude(random)
+            attitude, there = any_attitude(random), _on_orbit(loop, loop.start, random)
             torques: list[Vector] = []
             for t in (-time, time):
-                state = loop.start._replace(
+                state = there._replace(
                     attitude=normalise(multiply(attitude, (1.0, *scale(0.5 * t, rate)))),
                     rate=rate,
-                    position=add(loop.start.position, scale(t, loop.start.velocity)),
+                    position=add(there.position, scale(t, there.velocity)),
                 )
                 torques.append(module.torque(state, numbers, loop.craft, memory))
             size = norm(subtract(torques[1], torques[0])) / (2.0 * time)
             yield "change of the torque", size, change.torque + change.per_rate * norm(rate)
+
+
+def _on_orbit(loop: ClosedLoop, state: Any, random: np.random.Generator) -> Any:
+    """Return a state anywhere on its orbit, if it has one."""
+    place, speed = at_anomaly(state.position, state.velocity, loop.craft.gravity, 2.0 * pi * random.uniform())
+    return state._replace(position=place, velocity=speed) if loop.has("two-body") else state
 
 
 def _follows_as_it_says(part: Part) -> None:
@@ -141,9 +147,7 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
         # Now and then much later, at a step of the same phase of all that comes every few.
         step = count + LATER * (count // 8)
         if part.role == "environment":
-            # On all of the orbit.
-            place, speed = at_anomaly(state.position, state.velocity, loop.craft.gravity, 2.0 * pi * random.uniform())
-            state = state._replace(position=place, velocity=speed) if loop.has("two-body") else state
+            state = _on_orbit(loop, state, random)
             memory = module.update(memory, state, numbers, dice, step) if part.hook("update") else memory
             acting = module.torque(state, numbers, loop.craft, memory)
             yield "torque", norm(acting), most(torque, state)
