@@ -5,6 +5,7 @@ from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from starhold.certification.assumptions import ASSUMPTIONS
@@ -18,10 +19,14 @@ from starhold.laws import modal, wheel
 from starhold.parts.catalogue import PACKAGES, fit, parts
 from starhold.parts.contract import NoParams, Push
 from starhold.parts.part import Fitted, Part
+from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, parse
+from tests.certification.attack import flown
 from tests.certification.loops import certified, is_pointing, loop_of, rotors, says, textbook
+from tests.certification.own_spacecraft import OWN
 from tests.kernel import stations
 from tests.making import built, on_wheels
+from tests.parts.files import ACTUATOR, JETS, part
 from tests.tiers import leading
 
 NO, PUSH = (lambda *_: None), (lambda *_: Push(1e-6))
@@ -159,6 +164,8 @@ def half_told(role, **equations):
         (half_told("effector", reaction=NO, bound=PUSH), True),
         (half_told("environment", torque=NO, bound=PUSH), True),
         (half_told("environment", torque=NO, bound=PUSH, acceleration=NO), False),
+        # Of a momentum without wheels nothing is known.
+        (half_told("environment", torque=NO, bound=lambda _, envelope: Push(1e-3 * envelope.momentum)), False),
         (half_told("environment", torque=NO, bound=PUSH, MODELLED=True), False),
     ],
 )
@@ -167,3 +174,25 @@ def test_a_part_that_tells_half_of_what_it_does_is_left_out(own, enters):
     claim = certified("pd-0", disturbance=1e-4).claim("pointing")
     (told,) = named([claim], textbook()["pd-0"].with_parts(own), 1.0)
     assert (f"without:{own.part.role} of-ones-own" in told.assumptions) != enters
+
+
+@pytest.mark.parametrize(
+    ("most", "limit", "wide", "enters"),
+    [(1e-4, None, 0.0, False), (2e-3, 2e-3, 0.0, True), (2e-3, 3e-3, 0.0, False), (2e-3, 2e-3, 1e-6, False)],
+)
+def test_an_effector_that_may_not_give_what_is_asked_of_it_is_left_out(most, limit, wide, enters, tmp_path):
+    """A torque without a limit, or with a larger one, or one that an actuator changes; the first flies far outside."""
+    said = "\n\ndef error(params, envelope):\n    return Push(2.0 * params.width)\n"
+    (tmp_path / "jets.py").write_text(JETS)
+    (tmp_path / "dead_zone.py").write_text(ACTUATOR.replace("import Card,", "import Push, Card,") + said)
+    text = (
+        OWN if limit is None else OWN.replace("[initial]", f"torque_limit = {limit}\n[initial]").replace("20 deg", "2 deg")
+    )
+    text += part(f'file = "jets.py"\nmost = {most}\n') + part(f'file = "dead_zone.py"\nwidth = {wide}\n') * (wide > 0.0)
+    scenario = parse(text, "own.toml", tmp_path)
+    loop = build(scenario, scenario.laws[0])
+    claim = certify(loop, "own", Wanted(pointing=True, disturbance=1e-5, alone=True)).claim("pointing")
+    assert claim.outcome == "proved"
+    assert ("without:effector jets" not in claim.assumptions) == enters
+    if limit is None or enters:
+        assert (flown(loop, claim, np.random.default_rng(1), 8) < 1.0) == enters

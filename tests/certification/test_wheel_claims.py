@@ -22,7 +22,7 @@ from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.parts.craft import make_craft, tensor
 from starhold.parts.effectors.layouts import three_orthogonal
-from starhold.parts.effectors.wheels import lose
+from starhold.parts.effectors.wheels import axial_inertia, lose, make_wheels
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.studies.bodies.rigid_body import certify_law
@@ -300,3 +300,11 @@ def test_no_claim_is_about_less_momentum_than_is_had_on_target(tmp_path):
     write([certify(still, "", Wanted(momentum=0.0))], "made", tmp_path / "s.json")
     assert passed(check_file(tmp_path / "s.json"))
     assert certify(still, "", Wanted(momentum=0.0)).claim("wheels").outcome == "proved"
+
+
+def test_the_inertia_of_rotors_on_any_axes_is_symmetric():
+    """To the last bit: the body's is the difference, of which nothing is proved under the gravity gradient otherwise."""
+    random = np.random.default_rng(3)
+    for _ in range(8):
+        made = axial_inertia(make_wheels(random.normal(size=(5, 3)), random.uniform(1e-4, 1e-3, size=5), 0.1, 1.0))
+        assert np.array_equal(made, made.T)

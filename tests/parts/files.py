@@ -126,6 +126,66 @@ def torque(measurement, gains, craft, memory):
 def examples():
     return [Gains(0.09, 0.009)]
 '''
+JETS = f'''{HEAD}from starhold.algebra.scalar import less, where
+from starhold.algebra.vector import Vector, clip_axes
+from starhold.parts.contract import Push
+
+ROLE = "effector"
+ACTS = OUTSIDE = True
+
+
+class Params(NamedTuple):
+    """How strong it is."""
+
+    most: Annotated[float, Parameter("N m", above=0.0, text="largest torque about each axis")]
+
+
+class State(NamedTuple):
+    """What it has given."""
+
+    impulse: Vector
+
+
+def remember(params):
+    return State(ZERO)
+
+
+def command(applied, params):
+    return applied
+
+
+def applied(state, command, body, params):
+    return clip_axes(command, params.most)
+
+
+def reaction(state, command, body, params):
+    return applied(state, command, body, params)
+
+
+def rates(state, command, body, acceleration, params):
+    return State(command)
+
+
+def momentum(state, params):
+    return ZERO
+
+
+def sure_torque(params, kind):
+    return params.most
+
+
+def bound(params, envelope):
+    return Push(0.0)
+
+
+def error(params, envelope):
+    return Push(0.0)
+
+
+def examples():
+    return [Params(0.05)]
+'''
+"""An effector that takes the command, and gives it up to a limit."""
 PARTS = {
     "effector": (EFFECTOR, "coupling = [0.5, 0.2, 0.9]\nfrequency = 2.0\n"),
     "environment": (ENVIRONMENT, 'drag = "1 mN m s"\n'),

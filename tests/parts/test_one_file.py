@@ -9,6 +9,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 import starhold as sh
+from starhold.analysis.cost import recorded_states
 from starhold.conformance.parts import examine_part, find_part
 from starhold.conformance.suite import examine, find_law
 from starhold.laws import catalogue as laws
@@ -16,8 +17,10 @@ from starhold.parts.effectors import control_moment_gyros
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import installed
 from starhold.scenario.reading import parse
-from tests.parts.files import BODY, LAW, PARTS, PD, part
-from tests.refusals import refused
+from starhold.simulation.lane import fly, label
+from tests.making import built
+from tests.parts.files import BODY, JETS, LAW, PARTS, PD, part
+from tests.refusals import refused, replaced
 from tests.tiers import WHOLE, leading
 
 RECORDED = {"effector": {"deflection"}, "sensor": {"mine_rate"}, "estimator": {"gyro_rate", "mine_rate"}}
@@ -113,3 +116,11 @@ def test_an_effector_flies_from_a_scenario(name):
     assert run[recorded].dims == dimensions
     assert run[recorded].attrs["units"] == unit
     assert float(np.abs(run[recorded]).max()) > 1e-6
+
+
+def test_a_state_of_an_effector_needs_no_names(tmp_path):
+    """What a call costs is asked of the recorded states."""
+    plain = (("return State(ZERO)", "return ZERO"), ("return State(command)", "return command"))
+    (tmp_path / "mine.py").write_text(replaced(JETS, *plain))
+    loop = built(parse(BODY + part('file = "mine.py"\nmost = 0.05\n') + PD, "own", tmp_path))
+    assert recorded_states(loop, label(loop, *fly(loop, 5), 1)).shape == (6, 16 + 3)

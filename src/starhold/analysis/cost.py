@@ -55,9 +55,10 @@ def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float6
     columns = [recording[name][:CALLS] for name in type(carry.state)._fields]
     others = {name for name, _, _ in recorded(loop)} - {*type(carry.state)._fields}
     for state in carry.effectors:
-        for name, value in zip(state._fields, state, strict=True):
-            matches = [run for key, run in recording.arrays.items() if key.endswith(name) and key in others]
-            # A quantity that is not recorded keeps its initial value.
+        named = zip(state._fields, state, strict=True) if hasattr(state, "_fields") else [(None, state)]
+        for name, value in named:
+            matches = [run for key, run in recording.arrays.items() if name and key.endswith(name) and key in others]
+            # A quantity that is not recorded, or has no name, keeps its initial value.
             start = np.tile(flatten((value,)), (len(columns[0]), 1))
             columns.append(np.reshape(matches[0][:CALLS], start.shape) if matches else start)
     return np.hstack(columns)

@@ -92,15 +92,15 @@ class Pushes(NamedTuple):
 
 
 def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
-    """Return a set that the motions of a loop do not leave while its momentum (N m s) is within a bound, its orbit stays in
-    its band, and no part that is left out by name moves it; with a margin, because the lowest point of the orbit is computed
-    in floats. noisy: except for a share of the time."""
+    """Return a set that the motions of a loop do not leave while its momentum (N m s) is within a bound, which counts with
+    wheels only, its orbit stays in its band, and no part that is left out by name moves it; with a margin, because the
+    lowest point of the orbit is computed in floats. noisy: except for a share of the time."""
     start, share = loop.start, band_of(loop).share
     low, _, fast = extremes(loop) if loop.has("two-body") else (norm(start.position), inf, norm(start.velocity))
     moment = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[-1])
     field = sum(_field_error(fitted, loop.period, noisy) for fitted in loop.used("sensor"))
     low, fast = low * (1.0 - share) * (1.0 - 1e-9), fast * (1.0 + share) * (1.0 + 1e-9)
-    return Envelope(low, fast, momentum, moment * MORE, field)
+    return Envelope(low, fast, inf if loop.wheels is None else momentum, moment * MORE, field)
 
 
 def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
@@ -225,7 +225,8 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         left += [] if driven is None or noisy else driven.parts
         telling = [f for parts, _ in misread for f in parts if f not in left]
         there = [f for f in (*there, *telling) if f not in left]
-        absent = [f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope))]
+        others = [f for f in _acting(loop) if not (is_read(loop, f) or f in there)]
+        absent = [f for f in others if not (_says(loop, f, envelope) and _gives(loop, f, envelope, claim))]
         estimated = any(f in telling for f in loop.used("estimator"))
         settled = [name for name in SETTLED if estimated and name not in claim.assumptions]
         settled += (freshness(loop) + evenness(loop, claim.numbers.get("angle"))) if estimated else []
@@ -284,6 +285,20 @@ def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
         sized = torque and part.hook("inertia") is None
         return sized and (not part.flag("ACTS") or (error and not tells_momentum(loop, fitted)))
     return _is_idle(loop, fitted, envelope) or torque or error
+
+
+def _gives(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, claim: Claim) -> bool:
+    """Whether a part surely gives every torque that its loop asks it for under a claim."""
+    tell: Any = fitted.part.hook("sure_torque")
+    if tell is None:
+        return True
+    kept = claim.proof is not None and not {"limit", "limit.norm"}.isdisjoint(claim.proof.claim["numbers"])
+    largest = loop.craft.torque_limit if kept else inf
+    for f in loop.used("actuator"):
+        # What an actuator adds to the command counts, too.
+        added = _pushes(f, envelope)[1] or Push(0.0)
+        largest += inf if added.per_rate else added.torque
+    return tell(fitted.prepared(loop.period), "norm" if loop.limit == "norm" else "axis") >= largest
 
 
 def _always_moves(fitted: Fitted) -> bool:

@@ -96,9 +96,10 @@ def turned(attitude: Quaternion, before: Vector, after: Vector, period: float) -
 
 
 def anywhere(loop: ClosedLoop, random: np.random.Generator) -> Iterator[tuple[Any, float, float]]:
-    """Yield states of a rigid body at any attitudes and rates, and two zeros."""
-    while True:
-        attitude, rate = any_attitude(random), tuple(random.normal(size=3).tolist())
+    """Yield states of a rigid body at any attitudes and rates, of which some are small, and two zeros."""
+    for place in count():
+        size = 10.0 ** random.uniform(-8.0, 0.0) if place % 4 == 3 else 1.0
+        attitude, rate = any_attitude(random), tuple((size * random.normal(size=3)).tolist())
         yield loop.start._replace(attitude=attitude, rate=rate), 0.0, 0.0
 
 

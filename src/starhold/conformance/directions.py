@@ -25,6 +25,8 @@ from starhold.parts.vectors import KINDS
 
 OFF = {"sun": 0.002, "field": 0.005, "nadir": 0.003}
 """The errors of directions from which estimators compute attitudes here."""
+LATER = 720720
+"""So many control steps are a multiple of all numbers of up to 16."""
 
 
 def tells(part: Part) -> bool:
@@ -46,14 +48,24 @@ def sky_at(params: Any, loop: ClosedLoop) -> Sky:
 
 
 def _of_sensor(part: Part, loop: ClosedLoop) -> Iterator[tuple[str, float, float]]:
-    """Yield errors of the directions that a sensor measures without noise, and their bounds, where the field is as strong as
-    at the start."""
+    """Yield errors of the directions that a sensor measures without noise, and their bounds, at places as far away as the
+    start, at first there."""
     fitted = next(f for f in loop.parts if f.part == part)
     module, random, numbers = part.module, np.random.default_rng(1), fitted.prepared(loop.period)
     memory, params = fitted.remembered(numbers, loop.start), fitted.params
-    said: Direction = module.direction(params, loop.period, sky_at(params, loop)._replace(speed=0.0))
+    here = sky_at(params, loop)._replace(speed=0.0)
+    said: Direction = module.direction(params, loop.period, here)
     states = moving(loop, random, said.late) if said.late else anywhere(loop, random)
-    for step, (state, fast, _) in enumerate(islice(states, 2 * STEPS)):
+    for count, (state, fast, _) in enumerate(islice(states, 4 * STEPS)):
+        step = count
+        if not said.late and count > STEPS:
+            # Much later, too.
+            step = count + LATER * (count // 8)
+            state = state._replace(position=scale(here.distance, unit(_drawn(random))))
+            weakest = norm(field_at(params, state.position, step * loop.period))
+            said = module.direction(
+                params, loop.period, here._replace(weakest=weakest, turning=here.turning * here.weakest / weakest)
+            )
         reading, memory = module.measure(state, memory, numbers, Silent(), step)
         name, *flags = KINDS[said.of]
         seen = getattr(reading, name)

@@ -27,7 +27,10 @@ def moves_as_it_says(part: Part) -> None:
         if motion is None:
             continue
         numbers, module, seen = Fitted(part, params).prepared(loop.period), cast(Any, part.module), NO_TURN
-        for step in np.linspace(0.0, min(motion.until, 3e7) / loop.period, 20 * STEPS):
+        last = min(motion.until, 3e7) / loop.period
+        # Soon after the start motions may be brief.
+        soon = np.geomspace(1.0, last, 10 * STEPS) if last > 1.0 else []
+        for step in (*np.linspace(0.0, last, 10 * STEPS), *soon):
             state = loop.start
             if loop.has("two-body"):
                 position, velocity = at_anomaly(state.position, state.velocity, loop.craft.gravity, 6.3 * random.uniform())

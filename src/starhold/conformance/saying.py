@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
-from math import inf, pi
+from math import inf, isfinite, pi
 from typing import Any, cast
 
 import numpy as np
 
 from starhold.algebra.quaternion import multiply, normalise, to_body
+from starhold.algebra.structure import move
 from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, subtract, unit
 from starhold.certification.measured import bounded
-from starhold.certification.unmodelled import COMMANDED, envelope_of
-from starhold.conformance.bench import PERIOD, Jumping, any_attitude, anywhere, loop_with, momentum_of, moving
-from starhold.conformance.directions import field_at, misdirected, tells, turn_between
+from starhold.certification.unmodelled import COMMANDED, envelope_of, is_read
+from starhold.conformance.bench import (
+    PERIOD,
+    Jumping,
+    any_attitude,
+    anywhere,
+    loop_with,
+    momentum_of,
+    moving,
+    random_measurements,
+)
+from starhold.conformance.directions import LATER, field_at, misdirected, tells, turn_between
 from starhold.conformance.motions import moves_as_it_says, pulls_as_it_says
 from starhold.conformance.verdicts import STEPS, NotApplicableError, require
 from starhold.loop.closed_loop import ClosedLoop
@@ -24,8 +35,8 @@ from starhold.parts.part import Fitted, Part
 from starhold.parts.random import Dice
 from starhold.simulation.lane import fly
 
-LATER = 720720
-"""So many control steps are a multiple of all numbers of up to 16."""
+FEW, LONG = 4, 1000
+"""Commands and starts of flights that are tried, and the control steps of a long flight."""
 
 
 def keeps_what_it_says(part: Part) -> None:
@@ -72,17 +83,23 @@ def _changes(part: Part, loop: ClosedLoop, change: Push) -> Iterator[tuple[str, 
     memory = module.remember(numbers) if part.hook("remember") else None
     for rate in (ZERO, *(cast(Any, tuple(x)) for x in random.normal(size=(STEPS, 3)).tolist())):
         for _ in range(STEPS):
-            attitude = any_attitude(random)
+            attitude, there = any_attitude(random), _on_orbit(loop, loop.start, random)
             torques: list[Vector] = []
             for t in (-time, time):
-                state = loop.start._replace(
+                state = there._replace(
                     attitude=normalise(multiply(attitude, (1.0, *scale(0.5 * t, rate)))),
                     rate=rate,
-                    position=add(loop.start.position, scale(t, loop.start.velocity)),
+                    position=add(there.position, scale(t, there.velocity)),
                 )
                 torques.append(module.torque(state, numbers, loop.craft, memory))
             size = norm(subtract(torques[1], torques[0])) / (2.0 * time)
             yield "change of the torque", size, change.torque + change.per_rate * norm(rate)
+
+
+def _on_orbit(loop: ClosedLoop, state: Any, random: np.random.Generator) -> Any:
+    """Return a state anywhere on its orbit, if it has one."""
+    place, speed = at_anomaly(state.position, state.velocity, loop.craft.gravity, 2.0 * pi * random.uniform())
+    return state._replace(position=place, velocity=speed) if loop.has("two-body") else state
 
 
 def _follows_as_it_says(part: Part) -> None:
@@ -91,9 +108,11 @@ def _follows_as_it_says(part: Part) -> None:
     for params in part.examples():
         numbers, late = Fitted(part, params).prepared(PERIOD), module.late(params, PERIOD)
         require(0.0 <= late.kept < 1.0 and 0.0 < late.mean <= 1.0 and late.most > 0.0, f"{late} is not of what is late")
-        for _ in range(STEPS):
-            target = random.normal(size=3)
-            off = random.uniform(-1.0, 1.0, size=3) * min(late.most, 1.0) * 0.999
+        for place in range(STEPS):
+            # Of all sizes, and now and then about one axis alone.
+            size, shares = 10.0 ** random.uniform(-8.0, 0.0) if place % 2 else 1.0, random.uniform(-1.0, 1.0, size=3)
+            target = size * random.normal(size=3)
+            off = (np.eye(3)[place // 8 % 3] if place % 8 == 7 else shares) * min(late.most, size) * 0.999
             *outputs, wanted = (cast(Vector, tuple(x.tolist())) for x in (target + off, target))
             for _ in range(steps):
                 rate = module.rates(outputs[-1], wanted, outputs[0], PERIOD, numbers)
@@ -128,9 +147,7 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
         # Now and then much later, at a step of the same phase of all that comes every few.
         step = count + LATER * (count // 8)
         if part.role == "environment":
-            # On all of the orbit.
-            place, speed = at_anomaly(state.position, state.velocity, loop.craft.gravity, 2.0 * pi * random.uniform())
-            state = state._replace(position=place, velocity=speed) if loop.has("two-body") else state
+            state = _on_orbit(loop, state, random)
             memory = module.update(memory, state, numbers, dice, step) if part.hook("update") else memory
             acting = module.torque(state, numbers, loop.craft, memory)
             yield "torque", norm(acting), most(torque, state)
@@ -157,21 +174,69 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
                     2.0 * (errors.rate - errors.bias) + grown + at_first,
                 )
         elif part.role == "actuator" and part.hook("command"):
-            torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
+            torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-9, 0), size=3).tolist())
             yield (
                 "error of the command",
                 norm(subtract(module.command(torque_wanted, numbers), torque_wanted)),
                 command.torque,
             )
     if part.role == "effector":
-        for step in (1, 5, STEPS):
-            end = fly(loop, step)[1]
-            effector = end.effectors[[f.part for f in loop.used("effector")].index(part)]
-            if part.hook("bound"):
-                yield "torque", norm(module.reaction(effector, None, end.state, numbers)), most(torque, end.state)
-            if part.hook("error"):
-                torque_wanted = scale(
-                    0.1 * module.sure_torque(numbers, "norm"), cast(Any, tuple(random.uniform(-1, 1, 3).tolist()))
-                )
-                torque_given = module.applied(effector, module.command(torque_wanted, numbers), end.state, numbers)
-                yield "error of the command", norm(subtract(torque_given, torque_wanted)), most(command, end.state)
+        yield from _reactions(fitted, loop, torque, command)
+
+
+def _reactions(fitted: Fitted, loop: ClosedLoop, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:
+    """Yield how far the torque of an effector is from the one that it takes for applied, and this from the command, in
+    flights from some attitudes, with their bounds."""
+    module, numbers, random = cast(Any, fitted.part.module), fitted.prepared(loop.period), np.random.default_rng(7)
+    place, acts = [*loop.used("effector")].index(fitted), fitted.part.flag("ACTS")
+    begun = (state._replace(rate=scale(0.02, state.rate)) for state, *_ in islice(anywhere(loop, random), FEW))
+    for start in (loop.start, *begun):
+        for steps in (1, 5, STEPS, LONG):
+            end = fly(replace(loop, start=start), steps)[1]
+            body = end.state
+            for wanted in _commands(fitted, numbers, random) if acts else (ZERO,):
+                inner, given = _commanded(fitted, numbers, end.effectors[place], wanted, body)
+                applied = module.applied(inner, given, body, numbers) if acts else ZERO
+                if fitted.part.hook("bound"):
+                    besides = subtract(module.reaction(inner, given, body, numbers), applied)
+                    yield "torque", norm(besides), torque.torque + torque.per_rate * norm(body.rate)
+                if fitted.part.hook("error"):
+                    off = norm(subtract(applied, wanted))
+                    yield "error of the command", off, command.torque + command.per_rate * norm(body.rate)
+    if fitted.part.hook("error") and not is_read(loop, fitted):
+        # What it stores must not run out.
+        body, wanted = loop.start, [*_commands(fitted, numbers, random)][-1]
+        inner, given = _commanded(fitted, numbers, loop.carry().effectors[place], wanted, body)
+        for _ in range(5 * LONG):
+            inner = move(inner, loop.period, module.rates(inner, given, body, ZERO, numbers))
+        off = norm(subtract(module.applied(inner, given, body, numbers), wanted))
+        yield "error of a command that is held for long", off, command.torque + command.per_rate * norm(body.rate)
+
+
+def _commands(effector: Fitted, numbers: Any, random: np.random.Generator) -> Iterator[Vector]:
+    """Yield commands (N m) that an effector surely gives, some of the largest; any, if it does not say which."""
+    tell: Any = effector.part.hook("sure_torque")
+    ball, cube = (inf, inf) if tell is None else (tell(numbers, kind) * (1.0 - 1e-9) for kind in ("norm", "axis"))
+    for _ in range(FEW):
+        drawn, size = random.normal(size=3), 10.0 ** random.uniform(-9.0, 0.0)
+        yield _vector(size * min(ball, 1e3) * drawn / np.linalg.norm(drawn))
+        if isfinite(ball):
+            yield _vector(ball * drawn / np.linalg.norm(drawn))
+            yield _vector(min(cube, 1e3) * np.sign(drawn))
+
+
+def _vector(array: Any) -> Vector:
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def _commanded(effector: Fitted, numbers: Any, inner: Any, wanted: Vector, body: Any) -> tuple[Any, Any]:
+    """Return the state of an effector, on a body in its state, and the command that it takes, for a wanted torque (N m)."""
+    module: Any = effector.part.module
+    if not effector.part.flag("ACTS"):
+        return inner, ()
+    if effector.part.hook("switch"):
+        seen = next(random_measurements(1))._replace(attitude=body.attitude, rate=body.rate, body_rate=body.rate)
+        inner = module.switch(inner, wanted, seen, body, numbers, 0)
+        return inner, module.pulse(inner, PERIOD, numbers) if effector.part.hook("pulse") else ()
+    return inner, module.command(wanted, numbers)

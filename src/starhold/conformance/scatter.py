@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quaternion import multiply, normalise
 from starhold.algebra.vector import ZERO, Vector, add, norm, scale, subtract, unit
 from starhold.certification.measured import bounded
-from starhold.conformance.bench import loop_with
-from starhold.conformance.directions import scattered, sky_at, turn_between
+from starhold.conformance.bench import anywhere, loop_with
+from starhold.conformance.directions import field_at, scattered, sky_at, turn_between
 from starhold.conformance.verdicts import NotApplicableError, require
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS, Direction, Noise, Place
@@ -24,6 +26,8 @@ Array = NDArray[np.float64]
 FLIGHTS, BEFORE, READINGS, MORE = 40, 32, 8, 1.5
 """In so many flights, after so many readings, the errors of some more are summed: sums of what is new each time are rarely
 more than this multiple of their deviation in the mean, while errors that stay add up to nearly three times that."""
+PLACES, MOST, SLOW = 20, 3, 0.3
+"""Of so many states, at rates of about 0.3 rad/s, errors are looked at more closely in so many."""
 
 
 class Scatter(NamedTuple):
@@ -73,22 +77,51 @@ def _scatters(fitted: Fitted, loop: ClosedLoop) -> Iterator[Scatter]:
         turns = np.array(noise.attitude)
         said = {"rate": (noise.rate**2 + walk) * each, "attitude": turns @ turns.T * READINGS}
         said["magnetic_field"] = noise.field**2 * each
-        steps = {"magnetic_field": _steps(errors.field, noise.field)}
-        steps |= {"rate": _steps(errors.rate - errors.bias, noise.rate), "attitude": _steps(errors.attitude, turns.max())}
+        sizes = {"rate": (errors.rate - errors.bias, noise.rate), "attitude": (errors.attitude, turns.max())}
+        sizes["magnetic_field"] = errors.field, noise.field
         for name in said.keys() & {*module.Reading._fields}:
-            yield Scatter(f"error of the {name}", _sums(fitted, loop, name, noise.every), said[name], steps[name])
+            sums = _sums(fitted, loop, name, noise.every)
+            steps = _steps(fitted, loop, name, *sizes[name])
+            yield Scatter(f"error of the {name}", sums, said[name], steps)
+            alike = said[name] - (walk * each if name == "rate" else 0.0)
+            yield from (Scatter(f"error of the {name}", x, alike, steps) for x in _largest(fitted, loop, name))
     if part.hook("direction"):
         seen: Direction = module.direction(fitted.params, loop.period, sky_at(fitted.params, loop))
         if isfinite(seen.error):
             sums = _sums(fitted, loop, KINDS[seen.of][0], seen.every, as_direction=True)
-            steps_of = _steps(seen.error, seen.deviation)
-            yield Scatter(f"error of the {seen.of}", sums, seen.deviation**2 * each, steps_of)
+            steps = _steps(fitted, loop, KINDS[seen.of][0], seen.error, seen.deviation, as_direction=True)
+            for some in (sums, *_largest(fitted, loop, KINDS[seen.of][0], as_direction=True)):
+                yield Scatter(f"error of the {seen.of}", some, seen.deviation**2 * each, steps)
 
 
-def _steps(error: float, deviation: float) -> float:
-    """Return what noise may add by the steps of a reading, which are a part of its other errors, to their sum over the root
-    of their number: where these errors are not small, twice as much at each reading."""
-    return 2.0 * error * float(np.sqrt(READINGS)) if error > 2.0 * deviation else 0.0
+def _steps(fitted: Fitted, loop: ClosedLoop, name: str, error: float, deviation: float, as_direction: bool = False) -> float:
+    """Return what noise may add by the steps of a reading to the sum of its errors over the root of their number: where
+    errors are not small, twice as much at each reading as it differs from one that follows the motion evenly over about the
+    deviation of its noise."""
+    if not 2.0 * deviation < error:
+        return 0.0
+    module, numbers, random = fitted.part.module, fitted.prepared(loop.period), np.random.default_rng(4)
+    # A field turns with the body.
+    size = norm(field_at(fitted.params, loop.start.position, 0.0)) if name == "magnetic_field" and not as_direction else 1.0
+    most = 0.0
+
+    def reading(state: Any, moved: Any) -> Any:
+        moved = cast(Vector, tuple((3.0 / size * deviation * moved).tolist()))
+        if name == "rate":
+            state = state._replace(rate=add(state.rate, moved))
+        else:
+            state = state._replace(attitude=normalise(multiply(state.attitude, (1.0, *scale(0.5, moved)))))
+        return module.measure(state, fitted.remembered(numbers, state), numbers, Silent(), 0)[0]
+
+    for state, *_ in islice(anywhere(loop, random), READINGS):
+        moves = random.normal(size=(4 * MOST, 3))
+        first, *seen = (reading(state, moved) for moved in (np.zeros(3), *moves))
+        if all(getattr(one, flag, 1.0) > 0.5 for one in (first, *seen) for flag in flags_of(name)):
+            apart = np.array([_apart(name, getattr(first, name), getattr(one, name), as_direction) for one in seen])
+            given = np.column_stack([moves, np.ones(len(moves))])
+            off = apart - given @ np.linalg.lstsq(given, apart, rcond=None)[0]
+            most = max(most, float(np.linalg.norm(off, axis=1).max()))
+    return 2.0 * most * float(np.sqrt(READINGS))
 
 
 def _sums(fitted: Fitted, loop: ClosedLoop, name: str, every: int, as_direction: bool = False) -> Array:
@@ -102,12 +135,38 @@ def _sums(fitted: Fitted, loop: ClosedLoop, name: str, every: int, as_direction:
             seen.append(reading)
         return seen[BEFORE * every :: every]
 
-    still, flags = readings(Silent), (f"{name}_is_new", f"{name}_is_seen")
+    still, flags = readings(Silent), flags_of(name)
     for flight in range(FLIGHTS):
         for quiet, seen in zip(still, readings(lambda step, flight=flight: Dice((1, flight), step, 0)), strict=True):
             if all(getattr(one, flag, 1.0) > 0.5 for one in (seen, quiet) for flag in flags):
                 summed[flight] += _apart(name, getattr(quiet, name), getattr(seen, name), as_direction)
     return summed
+
+
+def _largest(fitted: Fitted, loop: ClosedLoop, name: str, as_direction: bool = False) -> Iterator[Array]:
+    """Yield random errors of a first reading in the states, of some, in which they seem to be largest, as if summed."""
+    module, numbers, random = fitted.part.module, fitted.prepared(loop.period), np.random.default_rng(8)
+    states = [state._replace(rate=scale(SLOW, state.rate)) for state, *_ in islice(anywhere(loop, random), PLACES)]
+
+    def drawn(place: int, first: int, count: int) -> Array:
+        begun = fitted.remembered(numbers, states[place])
+        quiet, *seen = (
+            module.measure(states[place], begun, numbers, dice, 0)[0]
+            for dice in (Silent(), *(Dice((1, first + k), 0, 0) for k in range(count)))
+        )
+        there = [one for one in seen if all(getattr(x, flag, 1.0) > 0.5 for x in (quiet, one) for flag in flags_of(name))]
+        apart = [_apart(name, getattr(quiet, name), getattr(one, name), as_direction) for one in there]
+        return np.reshape(np.array(apart), (-1, 3))
+
+    sizes = [float(np.sum(drawn(place, 0, 2) ** 2)) for place in range(PLACES)]
+    for place in sorted(range(PLACES), key=lambda place: -sizes[place])[:MOST]:
+        if sizes[place]:
+            yield float(np.sqrt(READINGS)) * drawn(place, 2, FLIGHTS)
+
+
+def flags_of(name: str) -> tuple[str, ...]:
+    """Return the names of readings that tell whether one of this name is there."""
+    return f"{name}_is_new", f"{name}_is_seen"
 
 
 def _apart(name: str, quiet: Any, seen: Any, as_direction: bool) -> Vector:

@@ -27,8 +27,9 @@ def least_squares(axes: Array, working: Sequence[int]) -> Array:
 
 
 def axial(axes: Array, inertia: Array) -> Array:
-    """Return the inertia (..., 3, 3; kg m2) of rotors (..., N) about their own axes (..., N, 3)."""
-    return (axes.swapaxes(-1, -2) * inertia[..., None, :]) @ axes
+    """Return the inertia (..., 3, 3; kg m2) of rotors (..., N) about their axes (..., N, 3), symmetric to the last bit."""
+    made = (axes.swapaxes(-1, -2) * inertia[..., None, :]) @ axes
+    return 0.5 * (made + made.swapaxes(-1, -2))
 
 
 def most_of_each(rows: Array, kind: str) -> Array:
