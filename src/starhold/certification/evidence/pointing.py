@@ -46,7 +46,7 @@ ANGLES = (175, 150, 120, 105, 90, 75, 60, 52, 45, 40, 35, 30, 25, 22, 20, 17, 15
 """The initial rotations (deg) from which convergence is attempted."""
 RATES = (5, 3, 2, 1)
 """The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
-WORTH = 0.75
+WORTH = 0.82
 """The share of the largest possible rotation that is worth to begin at a higher rate."""
 NEARLY = 10.0
 """A chain of levels that ends below this multiple of its `aim` is taken, and no other one is looked for."""
@@ -93,11 +93,21 @@ def finds(first: Pushed, tried: list[Beginning]) -> bool:
     """Find the claim from the largest start: by the law's own even V if it may begin there, or else by another V."""
     both = [first]
     if first.even:
-        other, limits = first.by_another(), tried[0][2]
+        other, (angles, rate, limits, beyond) = first.by_another(), tried[0]
         start = other.start(*tried[0])
-        if start[0] and first.find(*start, limits):
-            other.explain(start)
-            return True
+
+        def may_begin(farther: tuple[float, float]) -> bool:
+            return first.kept(first.may_begin, *farther, limits)
+
+        if start[0]:
+            more = [
+                (min((x for x in angles if x > start[0]), default=start[0]), start[1]),
+                (start[0], min((x for x in (*beyond, rate) if x > start[1]), default=start[1])),
+            ]
+            start = next((one for one in reversed(more) if one != start and may_begin(one)), start)
+            if first.find(*start, limits):
+                first.explain(start)
+                return True
         both = [other, first] if start[0] else [first, other]
     return any(pushed.find_largest(*one) for pushed in both for one in tried)
 
