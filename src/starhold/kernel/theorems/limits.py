@@ -125,9 +125,13 @@ def within_limits(
     for name, most, row in asks:
         assert asking is not None
         load, more = dot(row, asking.asked), reach([row], asking.rest)[0] + norm(row) * asking.pushed
-        yield f"{name} at first", Squares(most - load.at(asking.still), [poly(1), *q, *w], 0, asking.begun, [loop.sphere])
+        what, place = name.split()
+        yield (
+            f"{what} at first {place}",
+            Squares(most - load.at(asking.still), [poly(1), *q, *w], 0, asking.begun, [loop.sphere]),
+        )
         left = asking.pace * (most - load) - dot(row, asking.rates) - more
-        yield f"{name} falls", Squares(left, basis(loop, left), 0, known, [loop.sphere])
+        yield f"{what} falls {place}", Squares(left, basis(loop, left), 0, known, [loop.sphere])
     with_ = f"with {enumerated(bounds)} " if bounds else ""
     return Statement(with_ + enumerated(said), tuple(assumed), "wheels" if limits else TORQUE)
 
