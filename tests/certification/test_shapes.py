@@ -28,7 +28,7 @@ def pushed():
     return Pushed(loop, loop.known.against(loop.known.envelope(False)))
 
 
-def test_the_set_that_holds_a_start_keeps_the_limits_with_a_softer_potential_alone(pushed):
+def test_the_set_that_holds_a_start_keeps_the_limits_with_a_softer_potential_or_where_motions_stay(pushed):
     limits = pushed.loop.limits
     kept = []
     for shape in (*pushed.usual, *soft(pushed.sampled(pushed.usual[0]).motion, limits, ANGLE, RATE, ())):
@@ -38,7 +38,8 @@ def test_the_set_that_holds_a_start_keeps_the_limits_with_a_softer_potential_alo
     assert kept[: len(pushed.usual)] == [False] * len(pushed.usual)
     assert any(kept)
     [chosen] = pushed.begun(ANGLE, RATE, limits)
-    assert chosen.shape not in pushed.usual
+    assert chosen.shape in pushed.usual
+    assert chosen.slow
     assert chosen.decreases()
 
 

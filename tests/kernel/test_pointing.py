@@ -1,6 +1,5 @@
 """The loop that flies: what is proved of it, flights that are chosen against that, and false claims."""
 
-import copy
 import math
 import random
 import time
@@ -12,18 +11,16 @@ import pytest
 from starhold.certification.evidence import responses
 from starhold.certification.evidence.chains import Chain
 from starhold.certification.evidence.claims import floats
-from starhold.certification.evidence.finding import read
 from starhold.certification.proofs import checked
 from starhold.kernel.check import check
-from starhold.kernel.held import Held
-from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account, RefusedError, root, up
 from starhold.kernel.polynomials import Poly, most, total
 from starhold.kernel.regions import STATE, Region, factored, least_form
 from starhold.kernel.theorems.pointing import periods
 from starhold.kernel.theorems.response import Response
 from tests.kernel.certificates import POINTING, contents, failing, flying, text
-from tests.kernel.flights import Fleet, along, feedback, moved, turn
+from tests.kernel.flights import along, turn
+from tests.kernel.one_period import after_a_period, fleet_of, held_loop, states_of
 from tests.kernel.oracle import Oracle, number
 from tests.tiers import fewer, leading
 
@@ -43,39 +40,6 @@ def test_the_loop_is_proved_to_point(name):
     assert time.process_time() - begun < 4.0
     assert math.degrees(numbers(content)["end.angle"]) <= PROVED[name]
     assert "the torque is what the law asks for at the last sample" in proved.statement.written()
-
-
-def fleet_of(name, outside, error):
-    """Lanes of a loop under other pushes."""
-    (J, k_rate, k_attitude, h), _ = POINTING[name]
-    J = np.diag(J) if np.ndim(J) == 1 else np.array(J)
-    slow = math.sqrt(k_attitude / 2 / np.linalg.eigvalsh(J).max())
-    return Fleet(J, feedback(J, k_rate, k_attitude), h, outside, error, slow)
-
-
-def held_loop(name, **more):
-    """A loop with a held torque, whose pushes may be others than claimed."""
-    claim, Account.left = copy.deepcopy(flying(name).claims[0]), 10**12
-    claim["numbers"] |= {key: str(Fraction(x)) for key, x in more.items()}
-    return Held(AttitudeLoop(read(claim, flying(name).by_digest)))
-
-
-def states_of(oracle, level, count):
-    """States inside of {V <= level}, most of them at its border."""
-    oracle.numbers["level"] = level
-    pairs = [oracle.border(0.0, level * oracle.rng.uniform()) for _ in range(count)]
-    return [np.array(part).T for part in zip(*pairs, strict=True)]
-
-
-def after_a_period(fleet, q, w, unit, per_rate=0.0):
-    """The state after a period in which the error points one way, and the outside torque, which grows with the rate, turns
-    over at a time of its own."""
-    command, turned = fleet.law(q, w) + fleet.error * unit, fleet.rng.uniform()
-    for share, sign in ((turned, 1), (1 - turned, -1)):
-        for _ in range(4):
-            torque = command + sign * (fleet.outside + per_rate * np.linalg.norm(w, axis=0)) * unit
-            q, w = moved(fleet.J, fleet.inverse, q, w, torque, share * fleet.h / 4)
-    return q, w
 
 
 @pytest.mark.slow

@@ -28,8 +28,8 @@ from starhold.studies.bodies.rigid_body import wanted_of
 from tests.certification.attack import Attack
 from tests.kernel.certificates import contents
 from tests.kernel.flights import along
+from tests.kernel.one_period import after_a_period, fleet_of, held_loop, states_of
 from tests.kernel.oracle import Oracle
-from tests.kernel.test_pointing import after_a_period, fleet_of, held_loop, states_of
 
 SCENARIO = sh.load("geostationary")
 ENTRY = SCENARIO.pick("pd")
@@ -75,9 +75,7 @@ def test_flights_contradict_a_smaller_bound(claim):
     assert used[0] > 1.0
 
 
-@pytest.mark.parametrize(
-    ("name", "times"), [("kinetic", 0.6), (PACE, 0.2), (PACE, 4.0), (ASKED, 0.7), ("asked.pace", 0.1)]
-)
+@pytest.mark.parametrize(("name", "times"), [("kinetic", 0.6), (PACE, 0.2), (PACE, 4.0), (ASKED, 0.7), ("asked.pace", 0.1)])
 def test_no_evidence_is_found_for_other_bounds(begun, name, times):
     pushed, chain, numbers = begun
     motion = chain.motion

@@ -306,12 +306,12 @@ def beyond(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
     # Without any momentum the wheels store the opposite of the body's.
     stored = subtract(ZERO, apply(loop.craft.inertia, shown.rate))
     alone = Measurement(shown.attitude, shown.rate, shown.rate, ZERO, ZERO, ZERO, ZERO, loop.period, stored)
-    asked = np.array(evaluated(claim.programs["law"], measurement=alone, craft=loop.known, gains=loop.gains))
-    far |= (np.abs(asked) > n.get("asked_torque", np.inf)).any(axis=0)
+    command = np.array(evaluated(claim.programs["law"], measurement=alone, craft=loop.known, gains=loop.gains))
+    far |= (np.abs(command) > n.get("asked_torque", np.inf)).any(axis=0)
     if "asked_motors" in n and loop.wheels is not None:
         limits = np.array([np.inf if x is None else x for x in n["asked_motors"]])
         driven = np.array(loop.wheels.axes)[limits > 0.0]
-        far |= (limits[limits > 0.0] < np.abs(np.linalg.pinv(driven.T) @ asked).T).T.any(axis=0)
+        far |= (limits[limits > 0.0] < np.abs(np.linalg.pinv(driven.T) @ command).T).T.any(axis=0)
     return far
 
 

@@ -205,14 +205,8 @@ def assumed(identifiers: tuple[str, ...], loop: RecordedLoop) -> tuple[str, ...]
 def _set(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     """Return the numbers of the start set."""
     if "level" not in numbers:
-        return {
-            "level": None,
-            "start": None,
-            "everything": True,
-            "slew_angle": 2.0 * pi,
-            "rate": None,
-            "rate_everywhere": None,
-        }
+        nothing = dict.fromkeys(("level", "start", "rate", "rate_everywhere"))
+        return nothing | {"everything": True, "slew_angle": 2.0 * pi}
     # For an unknown inertia no rate is stated.
     level, angle, rate = (below(numbers[n]) if n in numbers else None for n in ("level", "angle", "rate"))
     whole = numbers.get("start.angle") == ANY_ANGLE
@@ -308,8 +302,9 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
 def _asked(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     """Return what the law may ask for because of the state alone: about each axis, and of each motor (N m)."""
     share, motors = numbers["asked"], [numbers.get(f"motors.{k}") for k in range(len(loop.loop.rotors))]
-    asked = {"asked_torque": below(share * numbers["limit"])} if "limit" in numbers else {}
-    return asked | {"asked_motors": [None if x is None else below(share * x) for x in motors]} if any(motors) else asked
+    bounds = [None if x is None else below(share * x) for x in motors]
+    axis = {"asked_torque": below(share * numbers["limit"])} if "limit" in numbers else {}
+    return axis | ({"asked_motors": bounds} if any(motors) else {})
 
 
 def _appended(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:

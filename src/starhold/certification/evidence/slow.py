@@ -43,8 +43,8 @@ def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[s
         rows = shares(motion, {name: x for name, x in limits.items() if name != "limit.norm"})
         if slow and len(rows) and motion.plan is None and motion.loop.added is None:
             tube = motion.tube(motion.region(Fraction(level)))
-            asked = bound_of_torque(motion, tube, level, angle, rate, rows)
-            return {} if asked is None else slow | asked
+            torque = bound_of_torque(motion, tube, level, angle, rate, rows)
+            return {} if torque is None else slow | torque
     except RefusedError:
         # The set is too large.
         return {}

@@ -19,14 +19,14 @@ TORQUE, UNIT = "torque-limit", variables("d")
 
 
 class Asking(NamedTuple):
-    """A law asks for `asked` because of the state alone, which stays within a share of each limit about an axis or of a
+    """A law asks for `command` because of the state alone, which stays within a share of each limit about an axis or of a
     motor. pace: how fast it may approach that (1/s), for each unit that is left. rates: polynomials of the mean rates of
-    change of `asked` from one sample to the next; rest: bounds of what these are besides, about each axis; pushed: of
+    change of `command` from one sample to the next; rest: bounds of what these are besides, about each axis; pushed: of
     another part, as a vector. begun, still: what is nonnegative, and what is zero, in states at first."""
 
     share: Fraction
     pace: Fraction
-    asked: list[Poly]
+    command: list[Poly]
     rates: list[Poly]
     rest: list[Fraction]
     pushed: Fraction
@@ -108,7 +108,7 @@ def within_limits(
         if asking and len(exact) == len(AXES) and any(exact) and not rest.terms:
             # A share of the limit itself, which was reduced.
             asks.append((name, asking.share * (bound + norm(exact) * less), exact))
-            known.append(asks[-1][1] - dot(exact, asking.asked))
+            known.append(asks[-1][1] - dot(exact, asking.command))
     for name, bound, row, rest in limited:
         used = [k for k in AXES if poly(row[k]).terms]
         cases = joined(loop.law[k] for k in used)
@@ -124,7 +124,7 @@ def within_limits(
                 yield full, within(bound, load, z, w, [*case.known, *squared * turned, *known], [loop.sphere])
     for name, most, row in asks:
         assert asking is not None
-        load, more = dot(row, asking.asked), reach([row], asking.rest)[0] + norm(row) * asking.pushed
+        load, more = dot(row, asking.command), reach([row], asking.rest)[0] + norm(row) * asking.pushed
         what, place = name.split()
         yield (
             f"{what} at first {place}",

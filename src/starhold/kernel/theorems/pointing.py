@@ -94,8 +94,8 @@ def descends(loop: AttitudeLoop, motion: Held) -> Proof:
     # Wheels take up what is asked for evenly, but for friction and for what is late, each no more than its bound.
     pushed = motion.pushed(tube.sizes)
     between = h / 2 * (pushed["both"] - pushed["outside"] - motion.planned(tube.sizes) + behind_at_most)
-    slow, asked = (yield from stays_slow(motion, tube)), asking(motion, tube)
-    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques, between, slow, asked)
+    slow, limiting = (yield from stays_slow(motion, tube)), asking(motion, tube)
+    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques, between, slow, limiting)
     if loop.signs:
         yield "the sign never changes", Exceeds(region.least, motion.misled(region.sizes)[0] / 2)
     if motion.late and (change := motion.change_in(tube)):
@@ -169,7 +169,7 @@ def descends(loop: AttitudeLoop, motion: Held) -> Proof:
     misread += [("target's rate", motion.led, "rad/s"), ("target's acceleration", motion.hurried, "rad/s2")]
     begun = "V <= " + below(numbers["level"] - behind) + ", q0 > 0" * motion.even
     begun += f", w.Jw <= {below(motion.kinetic)}" if motion.kinetic is not None else ""
-    begun += f", at most {below(asked.share)} of the limits asked for by the law for the state alone" if asked else ""
+    begun += f", at most {below(limiting.share)} of the limits asked for by the law for the state alone" if limiting else ""
     text = bounded_motion(numbers, begun, "", misread)
     text += with_motion(motion)
     text += f", the torque that acts late, {motion.late.in_words}" if motion.late else ""
