@@ -68,6 +68,16 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     return None
 
 
+def definiteness(o: Squares, scales: Mapping[str, float]) -> float | None:
+    """Return how definite the matrix of a sum of squares can be in floats, with the first of its ansatzes; None without."""
+    p, known, _ = settled(o)
+    ansatz = next(iter(ansatzes(o, p, known, len(o.z))))
+    others = [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts]
+    z = o.z if o.least else free([p, *known, *others], o.z)
+    x = most_definite(replace(posed(p, known, others, z), strict=len(o.strict)), scales)[0]
+    return None if x is None else float(x[-1])
+
+
 def plainly(o: Squares) -> dict[str, Any] | None:
     """Return evidence whose matrix is the remainder of p, without relations; None if that is refused."""
     p, known, fixed = settled(o)
@@ -227,17 +237,23 @@ def optimum(
     return interior_point(cost, whole, np.concatenate(right), A.shape[0], len(signed) + margin, sides)
 
 
-def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
-    """Return the factors in floats that make the Gram matrix most definite; None where it is not."""
+def most_definite(problem: Problem, scales: Mapping[str, float]) -> tuple[Any | None, Any]:
+    """Return the factors that make the Gram matrix most definite, with how much so, in units of others."""
     A, b, largest = equations(problem, scales)
     unit = float(np.abs(b).max()) or 1.0
     whole = A._replace(shape=(A.shape[0], A.shape[1] + 1))
     x = optimum(whole, b / unit, [k < problem.strict for k in range(problem.signed)], [problem.pairs], 2.0)
+    return x, unit / largest
+
+
+def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
+    """Return the factors in floats that make the Gram matrix most definite; None where it is not."""
+    x, units = most_definite(problem, scales)
     if x is None or x[-1] < DEFINITE:
         return None
     x = x[:-1]
     # Numbers that are only rounding would have to be compensated elsewhere.
-    return np.where(np.abs(x) < 1e-11 * np.abs(x).max(), 0.0, x) * unit / largest
+    return np.where(np.abs(x) < 1e-11 * np.abs(x).max(), 0.0, x) * units
 
 
 def largest_number(problem: Problem, scales: Mapping[str, float], wanted: Poly) -> float | None:

@@ -15,7 +15,7 @@ from starhold.certification.evidence.blends import renumbered
 from starhold.certification.evidence.cones import interior_point
 from starhold.certification.evidence.finding import NotFoundError, evidence
 from starhold.certification.evidence.sparse import entries_of
-from starhold.certification.evidence.squares import DEFINITE, cofactors, equations, free, posed, settled
+from starhold.certification.evidence.squares import DEFINITE, cofactors, definiteness, equations, free, posed, settled
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
@@ -26,6 +26,8 @@ from starhold.loop.closed_loop import ClosedLoop
 
 Array = NDArray[np.float64]
 POINTS = "points"
+CLEAR = 1e-6
+"""How definite the matrix of a sum of many squares has to be, because rounding one that is hardly so takes long."""
 
 
 def start_rate(loop: ClosedLoop) -> float:
@@ -41,10 +43,13 @@ def begins(loop: Loop, motion: Held, numbers: Mapping[str, Any], scales: Mapping
         begun = renumbered(motion, {**numbers, "highest": 0})
         wanted = dict(takewhile(lambda one: one[0] != "V between samples", descends(begun.loop, begun)))
         for name, o in wanted.items():
-            chance = likely(o, scales, tried) if isinstance(o, Squares) else None
-            if chance is None:
+            if not isinstance(o, Squares):
                 evidence(name, wanted, scales)
-            elif chance < DEFINITE:
+                continue
+            chance, least = likely(o, scales, tried), DEFINITE
+            if chance is None:
+                chance, least = definiteness(o, scales), CLEAR
+            if chance is None or chance < least:
                 raise NotFoundError(f"{name}: no sum of squares was found")
     except (NotFoundError, RefusedError) as reason:
         loop.failed[POINTS] = str(reason)
