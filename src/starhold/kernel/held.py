@@ -49,7 +49,7 @@ from .regions import (
     with_momentum,
 )  # fmt: skip
 
-WEIGHT, ZERO, ORDER, LONG, KINETIC = Fraction(8), Fraction(0), 4, 800, "kinetic"
+WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
 NEARER = Fraction(17, 16)
 """Errors that grow with the motion count as settled within this factor of their limit."""
 
@@ -61,8 +61,7 @@ class Held(Follower):
         numbers, x = loop.claim.numbers, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
         self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
-        # How fast functions of the state change, once that is known.
-        self.rates = dict[Any, tuple[Poly, Norms, Poly]]()
+        self.rates = dict[Any, tuple[Poly, Norms, Poly]]()  # What `mean_rate` returned.
         # What noise adds near the target, and what momentum adds to that.
         self.swayed = self.apart = AT_REST
         self.random = numbers.get("noise.torque") or ZERO
@@ -78,7 +77,8 @@ class Held(Follower):
         self.moving = [[numbers.get(f"error.{name}.per.{x}") or ZERO for x in of] for name in ("attitude", "rate")]
         self.ago, self.held_back = (numbers.get(f"error.{name}") or ZERO for name in ("ago", "kept"))
         demand(self.held_back < 1, "errors are not forgotten")
-        self.off, self.kinetic = loop.off if "tolerance" in numbers else ZERO, numbers.get(KINETIC)
+        self.off = loop.off if "tolerance" in numbers else ZERO
+        self.kinetic: Fraction | None = None  # A bound of w.Jw, where a theorem shows one.
         self.led, self.hurried = (numbers.get(f"error.target.{name}") or Fraction(0) for name in ("rate", "acceleration"))
         demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
         given = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}

@@ -31,11 +31,12 @@ from starhold.certification.evidence.slow import slowed
 from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
 from starhold.certification.matrices import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled
-from starhold.kernel.held import CHANGE, KINETIC
+from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand
 from starhold.kernel.programs import Program
 from starhold.kernel.reading import Told
+from starhold.kernel.theorems.kinetic import KINETIC
 from starhold.kernel.theorems.noise import SHARE
 from starhold.parts.craft import tensor
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from starhold.certification.evidence.shapes import shares
 from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import floats
-from starhold.kernel.held import KINETIC, Held
+from starhold.kernel.held import Held
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly, dot, minus
 from starhold.kernel.regions import RATE, STATE, Tube, felt
@@ -17,6 +17,7 @@ from starhold.kernel.theorems.kinetic import (
     ASKED,
     ASKED_PACE,
     CUBIC,
+    KINETIC,
     PACE,
     QUARTIC,
     changing,

@@ -16,9 +16,9 @@ from ..rules import Exceeds, Part, Squares
 from .attitude import within_turn
 from .limits import Asking, basis
 
-PACE, ASKED, ASKED_PACE = "kinetic.pace", "asked", "asked.pace"
-"""How fast w.Jw may approach its bound (1/s), for each unit that is left; the share of its limits that the law asks for at
-most because of the state alone, and how fast it may approach that."""
+KINETIC, PACE, ASKED, ASKED_PACE = "kinetic", "kinetic.pace", "asked", "asked.pace"
+"""A bound of w.Jw, and how fast it may be approached (1/s), for each unit that is left; the share of its limits that the law
+asks for at most because of the state alone, and how fast that may be approached."""
 TAYLOR = 3
 """The order of the derivative that is bounded."""
 CUBIC = ("q", "w", "qq", "qw", "ww", "qqw")
@@ -88,7 +88,7 @@ def changing(
     away = norm(moved_by(tube.steady + tube.pushed + tube.late.moved + calm)) / h
     rates = [mean_rate(motion, p, kinds) for p in parts]
     rest = [
-        total_of(norms, lengths) + h**TAYLOR / factorial(TAYLOR + 1) * fastest(last, sizes, speeds)
-        for _, norms, last in rates
+        total_of(bounds, lengths) + h**TAYLOR / factorial(TAYLOR + 1) * fastest(last, sizes, speeds)
+        for _, bounds, last in rates
     ]
     return [p for p, *_ in rates], rest, away * (felt([*parts], "w", sizes) + h / 4 * felt([*parts], "q", sizes))
