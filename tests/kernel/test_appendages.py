@@ -144,6 +144,14 @@ def test_a_stronger_claim_is_refused(name):
     assert not accepted(changed(content_of("bent"), stronger))
 
 
+def test_a_bound_of_the_rate_is_not_taken_from_a_claim_that_does_not_show_it():
+    def slowed(claim):
+        claim["numbers"] |= {"kinetic": "1/1000000000", "kinetic.pace": "1/100"}
+
+    assert accepted(content_of("bent"))
+    assert not accepted(changed(content_of("bent"), slowed))
+
+
 @pytest.mark.slow
 def test_each_piece_of_evidence_counts():
     content, refused, tried = content_of("bent"), 0, 0
