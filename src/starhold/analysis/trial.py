@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO
-from starhold.analysis.departure import measured_at, shown_at, value_of
+from starhold.analysis.departure import beyond, measured_at, shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.evidence.claims import settles
 from starhold.certification.evidence.recorded import TURNS
@@ -31,6 +31,8 @@ SLACK = 1e-6
 TURN = 0.05
 """The largest rotation (rad) of a body, or of its momentum in body axes, in a step."""
 
+SLOWER = 20
+"""How often the rate of a state is reduced until it is within the bounds of a claim."""
 NEAR, FAR = 1e-7, 10.0
 """Sizes of rotations (q) and rates (rad/s) near rest, where laws are linear, and beyond any boundary layer."""
 
@@ -78,7 +80,8 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     # A set about the target alone, with a V that is equal at both quaternions, has q0 > 0.
     one_sided = claim.kind == "pointing" and not height(_at_rest(-np.eye(4)[:, :1])).any()
     most = math.pi if one_sided else 2.0 * math.pi
-    free, states = _paced(free, certificate, draw(flights, height, level, random, most), random)
+    states = _within(free, claim, draw(flights, height, level, random, most))
+    free, states = _paced(free, certificate, states, random)
     highest, torque = 0.0, 0.0
 
     def value(states: Any) -> Any:
@@ -90,7 +93,18 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
             torque = max(torque, _need(batch.states, loop, claim))
     if torque > 1.0 + 1e-12:
         raise BrokenClaimError(f"{certificate.name}: a flight from the certified set needs {torque:.3g} of a limit")
-    return Trial(flights, level, highest, torque if _limited(claim) else None)
+    return Trial(states.shape[1], level, highest, torque if _limited(claim) else None)
+
+
+def _within(loop: ClosedLoop, claim: Claim, states: Array) -> Array:
+    """Return states of {V <= level} within the bounds of a claim's rate and torque, slower ones where they are beyond."""
+    if "kinetic" not in claim.numbers:
+        return states
+    states, far = states.copy(), np.zeros(states.shape[1], dtype=np.bool_)
+    for _ in range(SLOWER):
+        states[ROWS.rate, far] *= 0.8
+        far = np.asarray(beyond(claim, loop, measured_at(loop, _states(loop, states))))
+    return states[:, ~far]
 
 
 def _limited(claim: Claim) -> bool:
