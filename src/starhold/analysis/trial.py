@@ -104,6 +104,8 @@ def _within(loop: ClosedLoop, claim: Claim, states: Array) -> Array:
     for _ in range(SLOWER):
         states[ROWS.rate, far] *= 0.8
         far = np.asarray(beyond(claim, loop, measured_at(loop, _states(loop, states))))
+        if not far.any():
+            break
     return states[:, ~far]
 
 

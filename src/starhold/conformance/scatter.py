@@ -27,7 +27,8 @@ FLIGHTS, BEFORE, READINGS, MORE = 40, 32, 8, 1.5
 """In so many flights, after so many readings, the errors of some more are summed: sums of what is new each time are rarely
 more than this multiple of their deviation in the mean, while errors that stay add up to nearly three times that."""
 PLACES, MOST, SLOW = 20, 3, 0.3
-"""Of so many states, at rates of about 0.3 rad/s, errors are looked at more closely in so many."""
+"""The number of states in which errors are compared, of those in which they are looked at more closely, and the share of
+the usual rates (1 rad/s) at which bodies turn there."""
 
 
 class Scatter(NamedTuple):

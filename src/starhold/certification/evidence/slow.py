@@ -10,9 +10,10 @@ from starhold.certification.evidence.shapes import shares
 from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
+from starhold.kernel.loops import slopes
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly, dot, minus
-from starhold.kernel.regions import RATE, STATE, Tube, felt
+from starhold.kernel.regions import RATE, STATE, TURN, Tube, felt
 from starhold.kernel.theorems.kinetic import (
     ASKED,
     ASKED_PACE,
@@ -96,7 +97,8 @@ def bound_of_torque(
     if reached(rows @ torque) < 1.0 - spare:
         return {}
     rates, more, pushed = changing(motion, tube, motion.u, CUBIC)
-    linear, paces = rows @ np.array([slope_of(p) for p in rates]), PACES / float(motion.h)
+    at_rest = motion.loop.on_target | dict.fromkeys(STATE[RATE], 0)
+    linear, paces = rows @ floats(slopes(rates, STATE, at_rest)), PACES / float(motion.h)
     rest = float((np.abs(rows) @ floats([more])[0] + each * float(pushed)).max())
     needed = [(reached(rows @ torque + linear / pace) + rest / pace, float(pace)) for pace in paces]
     share, pace = min(needed)
@@ -107,10 +109,10 @@ def bound_of_torque(
 def at_first(motion: Held, rows: Array, angle: float, rate: float) -> float:
     """Return the largest share of a limit that the law asks for because of a state turned by up to an angle (rad) at up to a
     rate (rad/s)."""
-    turned, names = np.linspace(0.0, min(angle, np.pi), TURNS), ("q0", *STATE[3:], *STATE[RATE])
+    turned, names = np.linspace(0.0, min(angle, np.pi), TURNS), ("q0", *STATE[TURN], *STATE[RATE])
     most = 0.0
     for row, along in zip(rows, rows @ floats(motion.near.torque), strict=True):
-        q, w = (x / (float(np.linalg.norm(x)) or 1.0) for x in (along[3:], along[:3]))
+        q, w = (x / (float(np.linalg.norm(x)) or 1.0) for x in (along[TURN], along[RATE]))
         states = [np.cos(turned / 2.0), *np.outer(q, np.sin(turned / 2.0)), *np.outer(rate * w, np.ones(TURNS))]
         used = valued(dot([Fraction(float(x)) for x in row], motion.u), dict(zip(names, states, strict=True)))
         most = max(most, float(np.abs(used).max()))
@@ -138,9 +140,3 @@ def form_of(p: Poly, q0: Fraction) -> Array:
     """Return the matrix of a form in (w, q) that a polynomial is at some q0."""
     at, zero = p.at({"q0": q0}), dict.fromkeys(STATE, 0)
     return floats([[at.slope(i).slope(k).at(zero).number / 2 for k in STATE] for i in STATE])
-
-
-def slope_of(p: Poly) -> Array:
-    """Return the derivatives of a polynomial of (w, q) at rest on target."""
-    at = dict.fromkeys(STATE, 0) | {"q0": 1}
-    return floats([[p.slope(name).at(at).number for name in STATE]])[0]

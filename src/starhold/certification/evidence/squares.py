@@ -50,9 +50,7 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     """Return evidence that the kernel accepts; None where none was found. scales: about how large variables become."""
     p, known, fixed = settled(o)
     for count, ansatz in [(k, each) for k in counts(o) for each in ansatzes(o, p, known, k)]:
-        others = [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts]
-        z = o.z[:count] if o.least else free([p, *known, *others], o.z[:count])
-        problem = replace(posed(p, known, others, z), strict=len(o.strict))
+        problem = problem_of(o, p, known, ansatz, count)
         guess = solved(problem, scales)
         ways = [] if guess is None else [exactly] if o.least else [exactly, on_a_face]
         for way, digits in [(way, digits) for way in ways for digits in DIGITS]:
@@ -68,13 +66,18 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     return None
 
 
+def problem_of(o: Squares, p: Poly, known: list[Poly], ansatz: Sequence[Sequence[Poly]], count: int) -> Problem:
+    """Return the problem of an obligation, for what is settled of it, cofactors of its relations and the first of its z."""
+    others = [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts]
+    z = o.z[:count] if o.least else free([p, *known, *others], o.z[:count])
+    return replace(posed(p, known, others, z), strict=len(o.strict))
+
+
 def definiteness(o: Squares, scales: Mapping[str, float]) -> float | None:
     """Return how definite the matrix of a sum of squares can be in floats, with the first of its ansatzes; None without."""
     p, known, _ = settled(o)
     ansatz = next(iter(ansatzes(o, p, known, len(o.z))))
-    others = [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts]
-    z = o.z if o.least else free([p, *known, *others], o.z)
-    x = most_definite(replace(posed(p, known, others, z), strict=len(o.strict)), scales)[0]
+    x, _ = most_definite(problem_of(o, p, known, ansatz, len(o.z)), scales)
     return None if x is None else float(x[-1])
 
 

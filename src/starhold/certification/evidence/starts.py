@@ -15,7 +15,7 @@ from starhold.certification.evidence.blends import renumbered
 from starhold.certification.evidence.cones import interior_point
 from starhold.certification.evidence.finding import NotFoundError, evidence
 from starhold.certification.evidence.sparse import entries_of
-from starhold.certification.evidence.squares import DEFINITE, cofactors, definiteness, equations, free, posed, settled
+from starhold.certification.evidence.squares import DEFINITE, cofactors, definiteness, equations, problem_of, settled
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
@@ -67,9 +67,8 @@ def likely(o: Squares, scales: Mapping[str, float], tried: list[Array]) -> float
     a monomial of its own: it follows from multipliers and cofactors, and the interior point looks for these few alone. None
     otherwise. tried: those of similar sums, which often do, and to which those found are added."""
     p, known, _ = settled(o)
-    others = [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, len(o.z)), strict=True) for c in parts]
-    z = o.z if o.least else free([p, *known, *others], o.z)
-    problem = posed(p, known, others, z)
+    problem = problem_of(o, p, known, cofactors(o, p, len(o.z)), len(o.z))
+    z = problem.z
     entries, b, _ = equations(problem, scales)
     head, count = entries.shape[1] - len(problem.pairs), len(problem.pairs)
     A, grams = np.zeros((len(b), head)), list[tuple[int, float]]()

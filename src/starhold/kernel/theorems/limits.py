@@ -102,13 +102,8 @@ def within_limits(
         for text, unit, bound_of in (("motors give", "N m", motors), ("wheels store", "N m s", stored)):
             if any(x is not None for x in bound_of):
                 said.append(f"{text} no more than {', '.join('inf' if x is None else above(x) for x in bound_of)} {unit}")
-    asks = list[tuple[str, Fraction, list[Fraction]]]()
-    for name, bound, row, rest in limited if asking else ():
-        exact = [Fraction(x) for x in row if not isinstance(x, Poly)]
-        if asking and len(exact) == len(AXES) and any(exact) and not rest.terms:
-            # A share of the limit itself, which was reduced.
-            asks.append((name, asking.share * (bound + norm(exact) * less), exact))
-            known.append(asks[-1][1] - dot(exact, asking.command))
+    approached = [] if asking is None else list(approaches(asking, limited, less))
+    known += [room for *_, room, _ in approached]
     for name, bound, row, rest in limited:
         used = [k for k in AXES if poly(row[k]).terms]
         cases = joined(loop.law[k] for k in used)
@@ -122,18 +117,27 @@ def within_limits(
             if load.terms:
                 full = name if len(cases) == 1 else f"{name} {n}"
                 yield full, within(bound, load, z, w, [*case.known, *squared * turned, *known], [loop.sphere])
-    for name, most, row in asks:
-        assert asking is not None
-        load, more = dot(row, asking.command), reach([row], asking.rest)[0] + norm(row) * asking.pushed
-        what, place = name.split()
-        yield (
-            f"{what} at first {place}",
-            Squares(most - load.at(asking.still), [poly(1), *q, *w], 0, asking.begun, [loop.sphere]),
-        )
-        left = asking.pace * (most - load) - dot(row, asking.rates) - more
-        yield f"{what} falls {place}", Squares(left, basis(loop, left), 0, known, [loop.sphere])
+    if asking is not None:
+        for what, place, room, left in approached:
+            first = Squares(room.at(asking.still), [poly(1), *q, *w], 0, asking.begun, [loop.sphere])
+            yield f"{what} at first {place}", first
+            yield f"{what} falls {place}", Squares(left, basis(loop, left), 0, known, [loop.sphere])
     with_ = f"with {enumerated(bounds)} " if bounds else ""
     return Statement(with_ + enumerated(said), tuple(assumed), "wheels" if limits else TORQUE)
+
+
+def approaches(
+    asking: Asking, limited: Sequence[tuple[str, Fraction, Row, Poly]], less: Fraction
+) -> Iterator[tuple[str, str, Poly, Poly]]:
+    """Yield for limits of the torque about an axis and of motors, reduced by `less` for each unit of the torque, their names
+    and places, what is left of the law's share of them, and of its pace less the rate at which it approaches that."""
+    for name, bound, row, rest in limited:
+        exact = [Fraction(x) for x in row if not isinstance(x, Poly)]
+        if len(exact) == len(AXES) and any(exact) and not rest.terms:
+            what, place = name.split()
+            room = asking.share * (bound + norm(exact) * less) - dot(exact, asking.command)
+            more = reach([exact], asking.rest)[0] + norm(exact) * asking.pushed
+            yield what, place, room, asking.pace * room - dot(exact, asking.rates) - more
 
 
 def basis(loop: AttitudeLoop, p: Poly) -> list[Poly]:
