@@ -66,17 +66,22 @@ class Attack(Oracle):
             used += [*np.abs(np.linalg.pinv(axes) @ u) / np.array([[n[f"motors.{k}"]] for k in turned])]
         return np.max(used, axis=0)
 
-    def kept_bounds(self, law, q, w):
-        """The shares of the claim's bounds of w.Jw, and of what the law asks for because of the state, that states take."""
-        n = self.numbers
-        asked = self.loads(law(q, w)) / n["asked"] if "asked" in n else np.zeros(w.shape[1])
+    def kept_bounds(self, law, q, w, momentum=None):
+        """The shares of the claim's bounds of w.Jw, and of what the law asks for because of the state and of momentum, that
+        states take."""
+        n, asked = self.numbers, np.zeros(w.shape[1])
+        if "asked" in n:
+            with_it = [] if momentum is None else [np.zeros(w.shape)] * 3 + [momentum]
+            asked = self.loads(law(q, w, *with_it)) / n["asked"]
         return (w * (self.J @ w)).sum(axis=0) / n.get("kinetic", np.inf), asked
 
     def into(self, law, q, w):
         """States of the set near those that are beyond its bounds of rate and torque."""
-        q, w = q.copy(), w.copy()
+        q, w, most = q.copy(), w.copy(), self.numbers.get("momentum")
+        # Of any momentum that flights may begin with.
+        momenta = [None] if most is None else [most * one[:, None] + 0.0 * w for one in (*np.eye(3), *-np.eye(3))]
         for k in range(400):
-            beyond = np.max(self.kept_bounds(law, q, w), axis=0) > 1.0
+            beyond = np.max([self.kept_bounds(law, q, w, one) for one in momenta], axis=(0, 1)) > 1.0
             if not beyond.any():
                 return q, w
             w[:, beyond] *= 0.97
@@ -126,10 +131,12 @@ class Attack(Oracle):
             angle, rate = turn(q) / n["end.angle"], np.linalg.norm(w, axis=0) / n["end.rate"]
             shares = [high, *(float(x[settled].max()) if settled.any() else 0.0 for x in (angle, rate))]
             reached = [max(pair) for pair in zip(reached, shares, strict=True)]
-            self.used[:2] = np.maximum(self.used[:2], np.max(self.kept_bounds(law, q, w), axis=1))
+            momentum = fleet.surrounding.kept if "momentum" in n else None
+            self.used[:2] = np.maximum(self.used[:2], np.max(self.kept_bounds(law, q, w, momentum), axis=1))
             shares += [*self.used]
             if max(shares) > 1.0 and not found:
-                name = ("V", "angle", "rate", "w.Jw", "what is asked because of the state", "torque")[int(np.argmax(shares))]
+                of = "V", "angle", "rate", "w.Jw", "what is asked because of state and momentum", "torque"
+                name = of[int(np.argmax(shares))]
                 found = f"{name} is {max(shares):.6g} of its bound after {k * h:g} s"
         return found, reached
 

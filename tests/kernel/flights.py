@@ -226,7 +226,7 @@ class Fleet:
     def fly(self, q, w, periods, parts=2):
         """Yield the states between and at samples."""
         around = self.around and self.surroundings(self.around, self.J, self.inverse, self.rng, self.lanes)
-        self.off = None
+        self.off, self.surrounding = None, around
         for n in range(periods):
             unit = self.push(n, q, w)
             if around:

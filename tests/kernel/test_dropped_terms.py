@@ -9,7 +9,8 @@ import pytest
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.terms import valued
 from starhold.kernel.follower import FIRST, REST
-from starhold.kernel.held import MOMENTA, Held
+from starhold.kernel.held import Held
+from starhold.kernel.loops import MOMENTA
 from starhold.kernel.near import spinning
 from starhold.kernel.numbers import RefusedError, scalar
 from starhold.kernel.polynomials import var

@@ -10,12 +10,14 @@ from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.pointing import Pushed
+from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes, pushes
 from starhold.kernel.held import CHANGE, Held
-from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.loops import MOMENTA, AttitudeLoop
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.regions import ANGLE, AT_REST, SPEED, STATE
+from starhold.kernel.theorems.kinetic import QUARTIC, alone, changing, kinds_of, twice_energy
 from starhold.kernel.theorems.pointing import points
 from tests.kernel.flights import Around, Surroundings, along, cross
 from tests.kernel.oracle import Oracle, run
@@ -25,7 +27,7 @@ from tests.tiers import leading
 LANES = 2000
 
 
-def changing(n):
+def told_change(n):
     """How fast a torque that the law is told may change."""
     return tuple(n.get(name, other) for name, other in zip(CHANGE, (np.inf, 0.0), strict=True))
 
@@ -49,7 +51,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
     x *= rng.uniform(size=LANES) ** 0.2
     w, q = x[:3], np.concatenate([[np.sqrt(1.0 - (x[3:] ** 2).sum(0))], x[3:]])
     told = [n.get(f"outside.{k}", 0.0) for k in range(3)]
-    bounds = Surroundings(told, n["target.rate"], n["target.acceleration"], n["momentum"], 0.0, 0.0, None, changing(n))
+    bounds = Surroundings(told, n["target.rate"], n["target.acceleration"], n["momentum"], 0.0, 0.0, None, told_change(n))
     Q, H, F, size, rest, _ = held.fall(tube)
     Q, H, F = floats(Q), floats(H), floats(F)
     corners = np.array([floats(A) for A in held.corners()])
@@ -76,6 +78,17 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
                 outside = outside + around.loaded(unit, turning, part * h / 4)
                 later, rate = around.after(later, rate, h * k / 4, command, outside, part * h / 4)
         y, ended = np.concatenate([rate, later[1:]]), leaning(around, later, h)
+        states = [
+            dict(zip(("q0", *STATE[3:], *STATE[:3], *MOMENTA), np.concatenate(one), strict=True))
+            for one in ((q, w, momentum), (later, rate, around.kept))
+        ]
+        command = alone(held)
+        for parts, kinds in (([twice_energy(held)], QUARTIC), (command, kinds_of(command))):
+            means, beside, pushed = changing(held, tube, parts, kinds)
+            before, after = (np.array([valued(p, one) for p in parts]) for one in states)
+            off = np.abs((after - before) / h - [valued(p, states[0]) for p in means])
+            off /= np.array([[float(one + pushed)] for one in beside])
+            assert 0.01 < off.max() <= 1.0
         assert np.linalg.norm(begun, axis=0).max() <= float(held.leant[1])
         assert (np.abs(y) <= np.array([[float(tube.sizes[name])] for name in STATE])).all()
         drift = np.abs(rate - w).max(axis=1) / np.array([float(one) for one in tube.drift])
@@ -110,8 +123,8 @@ def carried(**more):
     """That loop with other numbers, and its programs."""
     Account.left = 10**12
     loop, own = calm()
-    n = {name: x for name, x in own.numbers.items() if name not in CHANGE} | more
-    n |= dict.fromkeys(("momentum", "target.rate", "target.acceleration"), 1e-9)
+    n = {name: x for name, x in own.numbers.items() if name not in CHANGE}
+    n |= dict.fromkeys(("momentum", "target.rate", "target.acceleration"), 1e-9) | more
     claim = own.claim(own.leans[0][1], n)
     return Held(AttitudeLoop(read(claim, loop.by_digest))), Oracle({"programs": loop.by_digest}, claim)
 
@@ -128,7 +141,7 @@ def test_a_torque_that_is_told_changes_a_motion_by_no_more_than_as_fast_as_it_ma
     x = np.linalg.cholesky(floats(region.X)) @ along(rng.normal(size=(6, lanes)))
     w, q = x[:3], np.concatenate([[np.sqrt(1.0 - (x[3:] ** 2).sum(0))], x[3:]])
     around = Around(
-        Surroundings(told[:, 0], 0.0, 0.0, n["momentum"], 0.0, 0.0, None, changing(n)), oracle.J, inverse, rng, lanes
+        Surroundings(told[:, 0], 0.0, 0.0, n["momentum"], 0.0, 0.0, None, told_change(n)), oracle.J, inverse, rng, lanes
     )
     around.kept = 0.0 * w
     unit = np.sign(rng.normal(size=(3, lanes)))
@@ -248,3 +261,37 @@ def test_a_potential_that_is_even_holds_motions_on_one_side_of_a_half_turn():
     claim = own.claim(V, own.numbers | {"level": 1e-6, "start.angle": 3.2, "start.rate": 0.0, "highest": 1.0})
     with pytest.raises(RefusedError, match="the other quaternion"):
         dict(points(read(claim, loop.by_digest)))
+
+
+def test_momentum_that_turns_with_the_target_changes_what_a_law_asks_for():
+    """Where body, momentum and target turn as fits worst, flights show what that adds, and the bound of a change has it."""
+    held, oracle = carried(**{"momentum": 5e-3, "target.rate": 0.02})
+    n, h, rng = oracle.numbers, float(held.h), np.random.default_rng(9)
+    level, command = (held.s + held.G[3][3]) / 2**12, alone(held)
+    tube = held.tube(held.region(level))
+    means, beside, pushed = changing(held, tube, command, kinds_of(command))
+    around = Around(
+        Surroundings([0.0] * 3, n["target.rate"], 0.0, n["momentum"], 0.0, 0.0, None, told_change(n)),
+        oracle.J, np.linalg.inv(oracle.J), rng, LANES,
+    )  # fmt: skip
+    q, w = np.eye(4)[0][:, None] + np.zeros(LANES), along(rng.normal(size=(3, LANES)))
+    # V is a form in w.
+    w *= np.sqrt(float(level) / (oracle.lyapunov(q, w) - oracle.lyapunov(q, 0.0 * w)))
+    around.kept, around.axis, around.phase = n["momentum"] * along(w), along(cross(w, rng.normal(size=(3, LANES)))), 0.0
+    momentum, none = around.kept, 0.0 * w
+    torque = around.command(lambda *given: run(oracle.programs["law"], oracle.inputs(*given)[0]), q, w, 0.0, none)
+    later, rate = q, w
+    for k in range(8):
+        later, rate = around.after(later, rate, k * h / 8, torque, none, h / 8)
+    ends = (
+        dict(zip(("q0", *STATE[3:], *STATE[:3], *MOMENTA), np.concatenate(one), strict=True))
+        for one in ((q, w, momentum), (later, rate, around.kept))
+    )
+    before, after = ends
+    changed = np.array([(valued(p, after) - valued(p, before)) / h for p in command])
+    off = np.linalg.norm(changed - [valued(p, before) for p in means], axis=0)
+    by_turning = np.linalg.norm(cross(w, cross(around.target(q, 0.0)[0], momentum)), axis=0).max()
+    *_, unturned = changing(held, tube, held.u, kinds_of(command))
+    assert off.max() > 0.8 * by_turning
+    assert float(pushed - unturned) > by_turning
+    assert off.max() < float(pushed) + np.linalg.norm([float(one) for one in beside])

@@ -4,6 +4,7 @@ steered against that, and false claims."""
 import math
 from dataclasses import replace
 from fractions import Fraction
+from itertools import takewhile
 
 import numpy as np
 import pytest
@@ -12,9 +13,11 @@ import starhold as sh
 from starhold.analysis.departure import height_of, shown_at
 from starhold.certification.certify import certify
 from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.blends import renumbered
 from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.evidence.shapes import shares
 from starhold.certification.evidence.slow import at_first
+from starhold.certification.evidence.squares import squares
 from starhold.certification.evidence.starts import begins
 from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import make_subject
@@ -23,6 +26,7 @@ from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import Poly, cross, dot, variables
 from starhold.kernel.regions import STATE
 from starhold.kernel.theorems.kinetic import ASKED, CUBIC, PACE, QUARTIC, changing, twice_energy
+from starhold.kernel.theorems.pointing import descends
 from starhold.scenario.building import build
 from starhold.studies.bodies.rigid_body import wanted_of
 from tests.certification.attack import Attack
@@ -30,6 +34,7 @@ from tests.kernel.certificates import contents
 from tests.kernel.flights import along
 from tests.kernel.one_period import after_a_period, fleet_of, held_loop, states_of
 from tests.kernel.oracle import Oracle
+from tests.making import built
 
 SCENARIO = sh.load("geostationary")
 ENTRY = SCENARIO.pick("pd")
@@ -51,26 +56,38 @@ def begun(claim):
     return pushed, chain, pushed.beginning(*start, loop.limits) | chain.of_level()
 
 
-def flown(claim, lanes=64, longest=400, **other):
+def flown(proof, programs, lanes=64, longest=400, **other):
     """A steered fleet of a claim, with other numbers in it."""
-    told = {name: Fraction(x) * Fraction(other.pop(name, 1)) for name, x in claim.proof.claim["numbers"].items()}
-    proof = claim.proof.claim | {"numbers": {name: str(x) for name, x in told.items()}}
-    attack = Attack({"programs": dict(claim.proof.programs)}, proof, 5, lanes)
+    told = {name: Fraction(x) * Fraction(other.pop(name, 1)) for name, x in proof["numbers"].items()}
+    attack = Attack({"programs": dict(programs)}, proof | {"numbers": {name: str(x) for name, x in told.items()}}, 5, lanes)
     attack.longest = longest
     return attack.worst()[0], attack.used
 
 
 def test_flights_come_near_to_the_bounds_and_not_beyond(claim):
     assert {"kinetic", "asked_torque"} <= claim.numbers.keys()
-    found, used = flown(claim)
+    found, used = flown(claim.proof.claim, claim.proof.programs)
     assert not found
     assert (used <= 1.0).all()
     assert (used[:2] > 0.85).all()
 
 
+def test_flights_with_momentum_come_near_to_the_bounds_and_not_beyond():
+    loop = Loop(make_subject(built("wheels-orbital", "wheel")))
+    pushed = Pushed(loop, loop.known.against(loop.known.envelope(False)))
+    assert pushed.find(math.radians(70.0), 0.004, loop.limits), loop.failed
+    [proof] = loop.claims
+    assert {"kinetic", "asked", "motors.0", "momentum"} <= proof["numbers"].keys()
+    found, used = flown(proof, loop.by_digest, longest=150)
+    assert not found
+    assert (used <= 1.0).all()
+    assert (used > 0.8).all()
+
+
 def test_flights_contradict_a_smaller_bound(claim):
-    assert not flown(claim, longest=1, kinetic=0.1)[0], "flights begin in the set"
-    found, used = flown(claim, kinetic=0.1)
+    proof = claim.proof.claim, claim.proof.programs
+    assert not flown(*proof, longest=1, kinetic=0.1)[0], "flights begin in the set"
+    found, used = flown(*proof, kinetic=0.1)
     assert found
     assert used[0] > 1.0
 
@@ -79,11 +96,19 @@ def test_flights_contradict_a_smaller_bound(claim):
 def test_no_evidence_is_found_for_other_bounds(begun, name, times):
     pushed, chain, numbers = begun
     motion = chain.motion
-    assert begins(pushed.loop, motion, numbers, chain.scales)
+
+    def shown(numbers):
+        if not begins(pushed.loop, motion, numbers, chain.scales):
+            return False
+        other = renumbered(motion, {**numbers, "highest": 0})
+        wanted = dict(takewhile(lambda one: one[0] != "V between samples", descends(other.loop, other)))
+        return all(squares(o, chain.scales) is not None for name, o in wanted.items() if " falls " in name)
+
+    assert shown(numbers)
     kinetic = motion.kinetic
     try:
         motion.kinetic = Fraction(numbers["kinetic"]) * Fraction(times if name == "kinetic" else 1)
-        assert not begins(pushed.loop, motion, numbers | {name: numbers[name] * times}, chain.scales)
+        assert not shown(numbers | {name: numbers[name] * times})
     finally:
         motion.kinetic = kinetic
 

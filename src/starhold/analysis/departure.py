@@ -298,13 +298,14 @@ def height_of(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
 
 
 def beyond(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
-    """Return where the body turns faster, or the law asks for more because of the state, than in the set of a claim."""
+    """Return where the body turns faster, or the law asks for more because of the state and the wheels' momentum, than in
+    the set of a claim."""
     n = claim.numbers
     far = 2.0 * kinetic_energy(shown.rate, loop.craft) > n.get("kinetic", np.inf)
     if "asked_torque" not in n and "asked_motors" not in n:
         return far
-    # Without any momentum the wheels store the opposite of the body's.
-    stored = subtract(ZERO, apply(loop.craft.inertia, shown.rate))
+    # As if the target were at rest, with the same total momentum.
+    stored = add(shown.wheel_momentum, apply(loop.craft.inertia, subtract(shown.body_rate, shown.rate)))
     alone = Measurement(shown.attitude, shown.rate, shown.rate, ZERO, ZERO, ZERO, ZERO, loop.period, stored)
     command = np.array(evaluated(claim.programs["law"], measurement=alone, craft=loop.known, gains=loop.gains))
     far |= (np.abs(command) > n.get("asked_torque", np.inf)).any(axis=0)

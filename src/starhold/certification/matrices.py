@@ -28,6 +28,18 @@ def floats(matrix: Sequence[Sequence[Any]]) -> NDArray[np.float64]:
     return np.array([[float(x) for x in row] for row in matrix], dtype=np.float64)
 
 
+def lyapunov(A: NDArray[np.float64], Q: NDArray[np.float64], flow: bool = False) -> NDArray[np.float64]:
+    """Return X with AX + XA' = Q (flow), or X - AXA' = Q, for few states: as linear equations of its entries. LinAlgError
+    without a solution."""
+    count, one = len(A), np.eye(len(A))
+
+    def paired(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (a[:, None, :, None] * b[None, :, None, :]).reshape(count**2, count**2)
+
+    over = paired(A, one) + paired(one, A) if flow else np.eye(count**2) - paired(A, A)
+    return np.asarray(np.linalg.solve(over, Q.ravel()).reshape(count, count), dtype=np.float64)
+
+
 def number(x: Any) -> float:
     """Return the nearest float of a rational or of a ball's middle."""
     if isinstance(x, fmpq):

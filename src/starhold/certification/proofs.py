@@ -300,7 +300,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
 
 
 def _asked(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
-    """Return what the law may ask for because of the state alone: about each axis, and of each motor (N m)."""
+    """Return what the law may ask for because of state and momentum alone: about each axis, and of each motor (N m)."""
     share, motors = numbers["asked"], [numbers.get(f"motors.{k}") for k in range(len(loop.loop.rotors))]
     bounds = [None if x is None else below(share * x) for x in motors]
     axis = {"asked_torque": below(share * numbers["limit"])} if "limit" in numbers else {}

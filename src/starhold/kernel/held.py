@@ -14,8 +14,8 @@ from functools import cached_property
 from typing import Any
 
 from .follower import Costs, Follower
-from .loops import AXES, NONE, AttitudeLoop
-from .near import CHANGE, MOMENTA, between, form_of, near_target
+from .loops import AXES, MOMENTA, NONE, AttitudeLoop
+from .near import CHANGE, between, form_of, near_target
 from .norms import Norms
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .plans import PLANNED, Plan
@@ -61,7 +61,7 @@ class Held(Follower):
         numbers, x = loop.claim.numbers, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
         self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
-        self.rates = dict[Any, tuple[Poly, Norms, Poly]]()  # What `mean_rate` returned.
+        self.rates = dict[Any, tuple[Poly, Norms, Poly, Fraction]]()  # What `mean_rate` returned.
         # What noise adds near the target, and what momentum adds to that.
         self.swayed = self.apart = AT_REST
         self.random = numbers.get("noise.torque") or ZERO

@@ -23,7 +23,7 @@ from .reading import IS_VALID, Claim
 from .rules import Definite, Shown, vanish
 
 AXES = range(3)
-RATES, TURNS = ("w1", "w2", "w3"), ("q1", "q2", "q3")
+RATES, TURNS, MOMENTA = ("w1", "w2", "w3"), ("q1", "q2", "q3"), ("h1", "h2", "h3")
 OUTSIDE, MOVING, WHEELS = "outside torque", "moving target", "wheels"
 """A loop has these only where the claim takes it with them."""
 SHORTEST, HYSTERESIS = "shortest sign", "hysteresis"

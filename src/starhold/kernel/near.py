@@ -15,7 +15,7 @@ from .regions import STATE, with_momentum
 CHANGE = "told.change", "told.change.per.rate"
 """How fast the external torque that the law knows changes, per second, and how much more for each rad that the body
 turns."""
-MOMENTA, ZERO = ("h1", "h2", "h3"), Fraction(0)
+ZERO = Fraction(0)
 HALF_ROOT = Fraction(7072, 10000)
 """At least the root of 1/2."""
 AROUND = [

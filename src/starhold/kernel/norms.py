@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from fractions import Fraction
-from math import factorial, prod
+from functools import cache
+from math import factorial, isqrt, prod
 
 from .loops import AXES
-from .numbers import Rows, root
+from .numbers import Rows
 from .polynomials import Monomial, Poly
 from .regions import stretch
 
+UNIT = 1 << 32
 Norms = dict[str, Fraction]
 """Bounds of multilinear functions of vectors, by the letters of these."""
 
@@ -19,15 +21,14 @@ Norms = dict[str, Fraction]
 def norms(p: Poly) -> Norms:
     """Return bounds of the terms with factors of the same letters, for vectors of the length 1 and |q0| <= 1: of the matrix
     that takes one of the vectors to products of the others."""
-    groups: dict[tuple[str, ...], dict[Monomial, Fraction]] = {}
-    for m, c in p.terms.items():
-        groups.setdefault(tuple(name if name == "q0" else name[0] for name in m), {})[m] = c
+    groups: dict[tuple[str, ...], dict[Monomial, int]] = {}
+    for m, c in p.upper.items():
+        groups.setdefault(tuple(name if name == "q0" else name[0] for name in m), {})[m] = abs(c)
     bounds = Norms()
     for letters, terms in groups.items():
         vectors = "".join(letter for letter in letters if letter != "q0")
-        ways = (stretch(unfolded(terms, letter, vectors.count(letter))) for letter in {*vectors})
-        least = min(ways, default=sum(map(abs, terms.values()), Fraction(0)))
-        bounds[vectors] = bounds.get(vectors, Fraction(0)) + least
+        ways = (stretch(unfolded(terms, letter)) / (vectors.count(letter) * UNIT) for letter in {*vectors})
+        bounds[vectors] = bounds.get(vectors, Fraction(0)) + min(ways, default=Fraction(sum(terms.values()))) / p.lower
     return bounds
 
 
@@ -36,17 +37,19 @@ def total_of(bounds: Norms, lengths: Mapping[str, Fraction]) -> Fraction:
     return sum((x * prod(lengths[letter] for letter in letters) for letters, x in bounds.items()), Fraction(0))
 
 
-def unfolded(terms: Mapping[Monomial, Fraction], letter: str, count: int) -> Rows:
-    """Return bounds of the entries of the matrix M of terms x.My, where x is one of `count` vectors with the letter, and y
-    has the products of all others: the square of the product of their lengths is the sum of squares of products, each as
-    often as it occurs."""
-    rest = sorted({without(m, name) for m in terms for name in m if name[0] == letter and name != "q0"})
-    place, rows = {m: k for k, m in enumerate(rest)}, [[Fraction(0)] * len(rest) for _ in AXES]
+def unfolded(terms: Mapping[Monomial, int], letter: str) -> Rows:
+    """Return bounds, in units, of the entries of the matrix M of terms x.My, where x is the sum of all vectors with the
+    letter, and y has the products of all others: the square of the product of their lengths is the sum of squares of
+    products, each as often as it occurs."""
+    places = dict[Monomial, int]()
+    entries = dict[tuple[int, int], int]()
     for m, c in terms.items():
-        for name in {name for name in m if name[0] == letter and name != "q0"}:
-            left = without(m, name)
-            rows[int(name[1]) - 1][place[left]] += abs(c) * m.count(name) / count * root(Fraction(1, often(left)))
-    return rows
+        for k in AXES:
+            if count := m.count(name := f"{letter}{k + 1}"):
+                left = without(m, name)
+                place = k, places.setdefault(left, len(places))
+                entries[place] = entries.get(place, 0) + c * count * share(left)
+    return [[Fraction(entries.get((k, place), 0)) for place in range(len(places))] for k in AXES]
 
 
 def without(m: Monomial, name: str) -> Monomial:
@@ -55,8 +58,11 @@ def without(m: Monomial, name: str) -> Monomial:
     return m[:place] + m[place + 1 :]
 
 
-def often(m: Monomial) -> int:
-    """Return in how many orders the factors of each letter can stand."""
+@cache
+def share(m: Monomial) -> int:
+    """Return what a monomial is at most, in units, of the length of the vector in which it stands once for each order of the
+    factors with the same letter."""
     names = [name for name in m if name != "q0"]
     letters = Counter(name[0] for name in names)
-    return prod(map(factorial, letters.values())) // prod(map(factorial, Counter(names).values()))
+    often = prod(map(factorial, letters.values())) // prod(map(factorial, Counter(names).values()))
+    return isqrt(UNIT * UNIT // often) + 1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from starhold.certification.evidence.cones import interior_point
 from starhold.certification.evidence.sparse import entries_of
-from starhold.certification.matrices import floats
+from starhold.certification.matrices import floats, lyapunov
 from starhold.kernel.held import Held
 from starhold.kernel.numbers import Rows, norm
 from starhold.kernel.regions import AT_REST, RATE, TURN, Radii, Tube
@@ -41,7 +41,7 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
         kept = 1.0 - shares.sum()
         if radius**2 * (1.0 + more) >= kept:
             return inf, A, shares
-        solution: Array = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
+        solution = lyapunov(A * sqrt((1.0 + more) / kept), fed)
         symmetric = (solution + solution.T) / 2.0
         # Enlarged so that no corner leaves it.
         room = symmetric - corners @ symmetric @ corners.transpose(0, 2, 1) / kept

@@ -3,15 +3,16 @@
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
-from typing import Any, TypeAlias, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
 from starhold.certification.evidence.cones import once
+from starhold.certification.evidence.mirrored import shown_once
 from starhold.certification.evidence.reduced import Reduced
 from starhold.certification.evidence.squares import plainly, rounded, squares, text
 from starhold.certification.evidence.terms import solved
-from starhold.certification.matrices import floats
+from starhold.certification.matrices import floats, lyapunov
 from starhold.kernel import rules
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.polynomials import Poly, poly
@@ -84,7 +85,7 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
     shown: Any = None
     o = wanted[name]
     if isinstance(o, rules.Squares):
-        shown = plainly(o) or squares(o, scales)
+        shown = shown_once(o, lambda: plainly(o) or squares(o, scales))
         if shown is None:
             raise NotFoundError(f"{name}: no sum of squares was found")
         # It was checked when it was found.
@@ -127,11 +128,9 @@ def contracts(o: rules.Contracts) -> list[list[str]]:
 
 
 def _lyapunov(A: Any, Q: Any, flow: bool = False) -> Any:
-    """Return X with AX + XA' = Q (flow), or X - AXA' = Q, for few states: as linear equations of its entries."""
-    one, numpy = np.eye(len(A)), cast(Any, np)
-    over = numpy.kron(A, one) + numpy.kron(one, A) if flow else numpy.eye(A.size) - numpy.kron(A, A)
+    """Return what `lyapunov` does. NotFoundError without a solution."""
     try:
-        return numpy.linalg.solve(over, Q.ravel()).reshape(A.shape)
+        return lyapunov(A, Q, flow)
     except np.linalg.LinAlgError:
         raise NotFoundError(UNSOLVED) from None
 

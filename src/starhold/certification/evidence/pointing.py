@@ -100,12 +100,14 @@ def finds(first: Pushed, tried: list[Beginning]) -> bool:
         def may_begin(farther: tuple[float, float]) -> bool:
             return first.kept(first.may_begin, *farther, limits)
 
+        def larger(start: tuple[float, float]) -> tuple[float, float] | None:
+            faster = start[0], min((x for x in (*beyond, rate) if x > start[1]), default=start[1])
+            farther = min((x for x in angles if x > start[0]), default=start[0]), start[1]
+            return next((one for one in (faster, farther) if one != start and may_begin(one)), None)
+
         if start[0]:
-            more = [
-                (min((x for x in angles if x > start[0]), default=start[0]), start[1]),
-                (start[0], min((x for x in (*beyond, rate) if x > start[1]), default=start[1])),
-            ]
-            start = next((one for one in reversed(more) if one != start and may_begin(one)), start)
+            while (more := larger(start)) is not None:
+                start = more
             if first.find(*start, limits):
                 first.explain(start)
                 return True

@@ -133,19 +133,28 @@ def asks_more(motion: Held, P: Array, level: float, used_by: Array, longest: flo
     matrix of V near the target; used_by: the result of `shares`; longest: the limit of the torque's norm."""
     r = np.random.default_rng(1)
     along, axes, *around = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2 + len(AROUND), 3, STATES)))
-    half = r.uniform(0.0, pi, STATES)
-    q, far = np.sin(half) * axes, 1.0 - np.cos(half)
-    # V is quadratic in the rate along each direction.
-    a, b = (along * (P[RATE, RATE] @ along)).sum(0), (along * (P[RATE, TURN] @ q)).sum(0)
-    turned = q if motion.even else q * np.sqrt(2.0 * far) / np.maximum(np.sin(half), 1e-300)
-    c = (turned * (P[TURN, TURN] @ turned)).sum(0) - level
-    inside = b * b >= a * c
-    fast = (np.sqrt(np.where(inside, b * b - a * c, 0.0)) - b) / a
-    names: list[str] = ["q0", *STATE[TURN], *STATE[RATE]]
-    x = dict(zip(names, (np.cos(half), *q, *(fast * along)), strict=True))
+    x, inside = on_border(P, motion.even, level, along, axes, r.uniform(0.0, pi, STATES))
     rows = [(f"{letter}{k + 1}", v) for letter, one in zip(AROUND, around, strict=True) for k, v in enumerate(one)]
     x |= {name: float(motion.others[name]) * v for name, v in rows if name in motion.others}
     u = np.array([valued(p, x) + np.zeros(STATES) for p in motion.loop.u])
     used = np.abs(used_by @ u).max(axis=0, initial=0.0)
     used = np.maximum(used, np.linalg.norm(u, axis=0) / longest)
     return bool(used[inside].max(initial=0.0) > 1.0)
+
+
+def on_border(
+    P: Array, even: bool, level: float, along: Array, axes: Array, half: Array, slow: Array | None = None
+) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+    """Return states turned by twice the angles `half` about axes, which turn as fast along directions as {V <= level} lets
+    them, and where there are any. P: the matrix of V near the target; slow: x, where w.xw is at most 1."""
+    q, far = np.sin(half) * axes, 1.0 - np.cos(half)
+    # V is quadratic in the rate along each direction.
+    a, b = (along * (P[RATE, RATE] @ along)).sum(0), (along * (P[RATE, TURN] @ q)).sum(0)
+    turned = q if even else q * np.sqrt(2.0 * far) / np.maximum(np.sin(half), 1e-300)
+    c = (turned * (P[TURN, TURN] @ turned)).sum(0) - level
+    inside = b * b >= a * c
+    fast = (np.sqrt(np.where(inside, b * b - a * c, 0.0)) - b) / a
+    if slow is not None:
+        fast = np.minimum(fast, 1.0 / np.sqrt((along * (slow @ along)).sum(0)))
+    names: list[str] = ["q0", *STATE[TURN], *STATE[RATE]]
+    return dict(zip(names, (np.cos(half), *q, *(fast * along)), strict=True)), inside

@@ -1,27 +1,29 @@
 """Looks for bounds of the body's rate and of the law's torque that motions keep although {V <= level} holds other states."""
 
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.certification.evidence.shapes import shares
+from starhold.certification.evidence.shapes import on_border, shares
 from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
-from starhold.kernel.loops import slopes
+from starhold.kernel.loops import MOMENTA
 from starhold.kernel.numbers import RefusedError
-from starhold.kernel.polynomials import Poly, dot, minus
+from starhold.kernel.polynomials import Poly, minus
 from starhold.kernel.regions import RATE, STATE, TURN, Tube, felt
 from starhold.kernel.theorems.kinetic import (
     ASKED,
     ASKED_PACE,
-    CUBIC,
     KINETIC,
     PACE,
     QUARTIC,
+    alone,
     changing,
+    kinds_of,
     mean_rate,
     twice_energy,
 )  # fmt: skip
@@ -32,9 +34,9 @@ PACES = np.geomspace(3e-3, 1.0, 60)
 """The paces that are tried, in units of one period."""
 WIDER, ROUNDS = 1.03, 8
 """The ratio of bounds that are tried, and how many are."""
-ROOM, TURNS, SHARES = 1.005, 50, np.geomspace(0.02, 1.0, 25)
-"""How much more of a limit the law may ask for than it does at first, how many turns are examined, and the weights of V
-beside w.Jw in ellipsoids that contain both sets."""
+ROOM, TURNS, STATES, NEARBY = 1.005, 50, 6000, 2
+"""How much more of a limit the law may ask for than it does at first, how many turns and how many states of a set are
+examined, and at how many lower paces a share has to do."""
 
 
 def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[str, Any]) -> dict[str, float]:
@@ -84,49 +86,62 @@ def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
 def bound_of_torque(
     motion: Held, tube: Tube, level: float, angle: float, rate: float, rows: Array
 ) -> dict[str, float] | None:
-    """Return the numbers of a bound of what the law asks for because of the state that seems to hold; none where it asks for
-    no more than its limits anyway, and None where there is no bound. rows: what takes the torque to shares of its limits."""
-    inner = inside(motion, level)
-
-    def reached(along: Array) -> float:
-        return float(np.sqrt(np.einsum("li,nij,lj->ln", along, inner, along).min(axis=1).max()))
-
-    torque, each = floats(motion.near.torque), np.linalg.norm(rows, axis=1)
-    besides = felt(minus(motion.loop.u, motion.u), "h", tube.region.sizes) * motion.size("h")
-    spare = float(motion.misread(tube.region)[0] + besides) * float(each.max())
-    if reached(rows @ torque) < 1.0 - spare:
+    """Return the numbers of a bound of what the law asks for because of state and momentum that seems to hold; none where it
+    asks for no more than its limits anyway, and None where there is no bound. rows: what takes the torque to shares of its
+    limits."""
+    command, each, sizes = alone(motion), np.linalg.norm(rows, axis=1), tube.region.sizes
+    beside = minus(motion.loop.u, command)
+    besides = [felt(beside, letter, sizes) * motion.size(letter) for letter in "era"]
+    most = 1.0 - float(motion.misread(tube.region)[0] + sum(besides, Fraction(0))) * float(each.max())
+    states = on_the_border(motion, level)
+    asked = used(motion, rows, command, states)
+    if largest_of(*asked) < most:
         return {}
-    rates, more, pushed = changing(motion, tube, motion.u, CUBIC)
-    at_rest = motion.loop.on_target | dict.fromkeys(STATE[RATE], 0)
-    linear, paces = rows @ floats(slopes(rates, STATE, at_rest)), PACES / float(motion.h)
+    rates, more, pushed = changing(motion, tube, command, kinds_of(command))
+    speeds, paces = used(motion, rows, rates, states), PACES / float(motion.h)
     rest = float((np.abs(rows) @ floats([more])[0] + each * float(pushed)).max())
-    needed = [(reached(rows @ torque + linear / pace) + rest / pace, float(pace)) for pace in paces]
-    share, pace = min(needed)
-    share = max(share, at_first(motion, rows, angle, rate)) * ROOM
-    return {ASKED: share, ASKED_PACE: pace} if share < 1.0 else None
+    needed = [largest_of(*(p + rate / pace for p, rate in zip(asked, speeds, strict=True))) + rest / pace for pace in paces]
+    # Just below the best pace much more is needed, and everywhere a sum of squares needs more than these states do.
+    share, pace = min((max(needed[max(k - NEARBY, 0) : k + 1]), float(pace)) for k, pace in enumerate(paces))
+    share = max(share, at_first(motion, rows, angle, rate) * ROOM)
+    # What the rest of the torque leaves, but for some room that it needs too.
+    return {ASKED: (share + 2.0 * most) / 3.0, ASKED_PACE: pace} if share < most else None
+
+
+def used(motion: Held, rows: Array, parts: Sequence[Poly], states: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Return what rows make of torques in some states without momentum, and what the largest one adds about each axis."""
+    none, size = np.zeros(len(states["q0"])), float(motion.size("h"))
+    momenta = [dict.fromkeys(MOMENTA, none) | dict.fromkeys(one, none + size) for one in ("", *zip(MOMENTA))]
+    first, *others = (rows @ np.array([valued(p, {**states, **one}) + none for p in parts]) for one in momenta)
+    return first, np.array(others) - first
+
+
+def largest_of(alone: Array, turned: Array) -> float:
+    """Return the most of what `used` returns, with momentum in any direction."""
+    return float((np.abs(alone) + np.linalg.norm(turned, axis=0)).max())
+
+
+def on_the_border(motion: Held, level: float) -> dict[str, Array]:
+    """Return states of {V <= level}, as far as w.Jw is within its bound, that turn as fast there along some direction."""
+    r = np.random.default_rng(1)
+    along, axes = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2, 3, STATES)))
+    half, slow = r.uniform(0.0, np.pi / (1 + motion.even), STATES), None
+    if motion.kinetic is not None:
+        slow = floats(motion.loop.given) / float(motion.kinetic)
+    states, inside = on_border(floats(motion.form(motion.s / 2)), motion.even, level, along, axes, half, slow)
+    return {name: x[inside] for name, x in states.items()}
 
 
 def at_first(motion: Held, rows: Array, angle: float, rate: float) -> float:
-    """Return the largest share of a limit that the law asks for because of a state turned by up to an angle (rad) at up to a
-    rate (rad/s)."""
+    """Return the largest share of a limit that the law asks for because of momentum and a state turned by up to an angle
+    (rad) at up to a rate (rad/s)."""
     turned, names = np.linspace(0.0, min(angle, np.pi), TURNS), ("q0", *STATE[TURN], *STATE[RATE])
-    most = 0.0
+    command, most = alone(motion), 0.0
     for row, along in zip(rows, rows @ floats(motion.near.torque), strict=True):
         q, w = (x / (float(np.linalg.norm(x)) or 1.0) for x in (along[TURN], along[RATE]))
         states = [np.cos(turned / 2.0), *np.outer(q, np.sin(turned / 2.0)), *np.outer(rate * w, np.ones(TURNS))]
-        used = valued(dot([Fraction(float(x)) for x in row], motion.u), dict(zip(names, states, strict=True)))
-        most = max(most, float(np.abs(used).max()))
+        most = max(most, largest_of(*used(motion, row[None], command, dict(zip(names, states, strict=True)))))
     return most
-
-
-def inside(motion: Held, level: float) -> Array:
-    """Return matrices of ellipsoids in (w, q), around rest, that contain {V <= level} as far as w.Jw is within its bound."""
-    whole = floats(motion.under) / level
-    if motion.kinetic is None:
-        return np.asarray(np.linalg.inv(whole)[None], dtype=np.float64)
-    slow = energy_of(motion) / float(motion.kinetic)
-    forms = [c * whole + (1.0 - c) * slow for c in SHARES]
-    return np.asarray(np.linalg.inv(np.array(forms)), dtype=np.float64)
 
 
 def energy_of(motion: Held) -> Array:

@@ -46,6 +46,9 @@ def begins(loop: Loop, motion: Held, numbers: Mapping[str, Any], scales: Mapping
             if not isinstance(o, Squares):
                 evidence(name, wanted, scales)
                 continue
+            if " falls " in name:
+                # These take long, and states of the set have told what may be asked for.
+                continue
             chance, least = likely(o, scales, tried), DEFINITE
             if chance is None:
                 chance, least = definiteness(o, scales), CLEAR

@@ -5,25 +5,24 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from fractions import Fraction
-from math import factorial
 
-from ..held import Held
+from ..held import LONG, ORDER, Held
 from ..norms import Norms, norms, total_of
 from ..numbers import demand, norm
 from ..polynomials import Poly, apply, dot, fastest
 from ..regions import ANGLE, SPEED, Tube, felt, stretch
 from ..rules import Exceeds, Part, Squares
 from .attitude import within_turn
-from .limits import Asking, basis
+from .limits import Asking, basis, heeds_momentum
 
 KINETIC, PACE, ASKED, ASKED_PACE = "kinetic", "kinetic.pace", "asked", "asked.pace"
 """A bound of w.Jw, and how fast it may be approached (1/s), for each unit that is left; the share of its limits that the law
-asks for at most because of the state alone, and how fast that may be approached."""
-TAYLOR = 3
-"""The order of the derivative that is bounded."""
+asks for at most because of state and momentum alone, and how fast that may be approached."""
 CUBIC = ("q", "w", "qq", "qw", "ww", "qqw")
 QUARTIC = (*CUBIC, "qqqq")
 """The letters of monomials that stand in a sum of squares."""
+MOMENTUM = ("hw", "hq", "hqq", "hqw", "hww", "hhw", "hqqw", "hhww", "qqqq")
+"""Those with the wheels' momentum, where the law reads it."""
 
 
 def stays_slow(motion: Held, tube: Tube) -> Part[list[Poly]]:
@@ -47,14 +46,25 @@ def asking(motion: Held, tube: Tube) -> Asking | None:
     numbers, loop, still = motion.loop.claim.numbers, motion.loop, motion.loop.still
     if (share := numbers.get(ASKED)) is None:
         return None
-    pace = numbers[ASKED_PACE]
+    pace, command = numbers[ASKED_PACE], alone(motion)
     demand(0 < share < 1 and 0 < motion.h * pace <= 1, "a limit is not properly approached")
     demand(motion.plan is None and loop.added is None and "rate" not in numbers, "a limit is not approached like this")
     begun = within_turn(loop, numbers["start.angle" if "start.rate" in numbers else "angle"])
     if "start.rate" in numbers:
         still = dict[str, int]()
         begun.append(numbers["start.rate"] ** 2 - dot(loop.w, loop.w))
-    return Asking(share, pace, motion.u, *changing(motion, tube, motion.u, CUBIC), begun, still)
+    return Asking(share, pace, command, *changing(motion, tube, command, kinds_of(command)), begun, still)
+
+
+def alone(motion: Held) -> list[Poly]:
+    """Return what the law asks for because of the state and of the wheels' momentum, without anything else from outside."""
+    absent = {name: 0 for name in motion.others if name[0] != "h"}
+    return [p.at(absent) for p in motion.loop.u]
+
+
+def kinds_of(command: Sequence[Poly]) -> tuple[str, ...]:
+    """Return the letters of monomials of a torque's rate of change that stand in a sum of squares."""
+    return (*CUBIC, *MOMENTUM) if heeds_momentum(command) else CUBIC
 
 
 def twice_energy(motion: Held) -> Poly:
@@ -62,17 +72,18 @@ def twice_energy(motion: Held) -> Poly:
     return dot(motion.loop.w, apply(motion.loop.given, motion.loop.w))
 
 
-def mean_rate(motion: Held, p: Poly, kinds: Collection[str]) -> tuple[Poly, Norms, Poly]:
-    """Return the mean rate of change of a function of q and w in a period without disturbances, up to a derivative: the
-    terms with factors of these letters, and bounds of the rest; and that derivative while the torque is held."""
+def mean_rate(motion: Held, p: Poly, kinds: Collection[str]) -> tuple[Poly, Norms, Poly, Fraction]:
+    """Return the mean rate of change of a function in a period without disturbances, up to a derivative: the terms with
+    factors of these letters, and bounds of the rest; then that derivative while the torque is held, and its share in it."""
     key = *kinds, p.lower, *p.upper.items()
     if key not in motion.rates:
-        rates = [motion.along(p)]
-        while len(rates) < TAYLOR:
+        rates, shares = [motion.along(p)], [Fraction(1)]
+        while len(rates) < ORDER and len(rates[-1].upper) < LONG:
             rates.append(motion.along(rates[-1]))
-        mean = dot([motion.h**k / factorial(k + 1) for k in range(TAYLOR)], rates).at(motion.commanded)
+            shares.append(shares[-1] * motion.h / len(rates))
+        mean = dot(shares, rates).at(motion.commanded)
         short = mean.only(lambda m: "".join(sorted(name[0] for name in m)) in kinds)
-        motion.rates[key] = short, norms(mean - short), rates[-1]
+        motion.rates[key] = short, norms(mean - short), rates[-1], shares[-1] * motion.h / (len(rates) + 1)
     return motion.rates[key]
 
 
@@ -86,9 +97,9 @@ def changing(
     lengths = {"w": tube.region.sizes[SPEED], "q": tube.region.sizes[ANGLE]} | motion.extents
     moved_by, calm = motion.mover(tube)
     away = norm(moved_by(tube.steady + tube.pushed + tube.late.moved + calm)) / h
+    # Momentum turns with the target too, grows by torques from outside, and turns with a body that is moved.
+    turned = 2 * motion.changes(sizes, 0)["h"] / h + h / 2 * away * motion.size("h")
     rates = [mean_rate(motion, p, kinds) for p in parts]
-    rest = [
-        total_of(bounds, lengths) + h**TAYLOR / factorial(TAYLOR + 1) * fastest(last, sizes, speeds)
-        for _, bounds, last in rates
-    ]
-    return [p for p, *_ in rates], rest, away * (felt([*parts], "w", sizes) + h / 4 * felt([*parts], "q", sizes))
+    rest = [total_of(bounds, lengths) + share * fastest(last, sizes, speeds) for _, bounds, last, share in rates]
+    moved = away * (felt([*parts], "w", sizes) + h / 4 * felt([*parts], "q", sizes))
+    return [p for p, *_ in rates], rest, moved + turned * felt([*parts], "h", sizes)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
-from ..loops import AXES, NONE, AttitudeLoop
+from ..loops import AXES, MOMENTA, NONE, AttitudeLoop
 from ..numbers import Rows, definite, demand, inverse, norm, reach, times, transpose
 from ..polynomials import Poly, apply, dot, poly, var, variables
 from ..programs import joined
@@ -19,10 +19,10 @@ TORQUE, UNIT = "torque-limit", variables("d")
 
 
 class Asking(NamedTuple):
-    """A law asks for `command` because of the state alone, which stays within a share of each limit about an axis or of a
-    motor. pace: how fast it may approach that (1/s), for each unit that is left. rates: polynomials of the mean rates of
-    change of `command` from one sample to the next; rest: bounds of what these are besides, about each axis; pushed: of
-    another part, as a vector. begun, still: what is nonnegative, and what is zero, in states at first."""
+    """A law asks for `command` because of state and momentum alone, which stays within a share of each limit about an axis
+    or of a motor. pace: how fast it may approach that (1/s), for each unit that is left. rates: polynomials of the mean
+    rates of change of `command` from one sample to the next; rest: bounds of what these are besides, about each axis;
+    pushed: of another part, as a vector. begun, still: what is nonnegative, and what is zero, in states at first."""
 
     share: Fraction
     pace: Fraction
@@ -119,9 +119,14 @@ def within_limits(
                 yield full, within(bound, load, z, w, [*case.known, *squared * turned, *known], [loop.sphere])
     if asking is not None:
         for what, place, room, left in approached:
-            first = Squares(room.at(asking.still), [poly(1), *q, *w], 0, asking.begun, [loop.sphere])
+            z, ball = [poly(1), *q, *w], list[Poly]()
+            if heeds_momentum([room]):
+                z += loop.H
+                ball = [numbers["momentum"] ** 2 - dot(loop.H, loop.H)]
+            first = Squares(room.at(asking.still), z, 0, [*asking.begun, *ball], [loop.sphere])
             yield f"{what} at first {place}", first
-            yield f"{what} falls {place}", Squares(left, basis(loop, left), 0, known, [loop.sphere])
+            turned = [x * x * p for x in w for p in ball]
+            yield f"{what} falls {place}", Squares(left, basis(loop, left), 0, [*known, *turned], [loop.sphere])
     with_ = f"with {enumerated(bounds)} " if bounds else ""
     return Statement(with_ + enumerated(said), tuple(assumed), "wheels" if limits else TORQUE)
 
@@ -141,13 +146,20 @@ def approaches(
 
 
 def basis(loop: AttitudeLoop, p: Poly) -> list[Poly]:
-    """Return the terms whose squares and products a polynomial in attitude and rate may be a sum of."""
-    z = [poly(1), *loop.q, *loop.w]
-    if p.degree > 3:
-        z += [a * b for k, a in enumerate(loop.q) for b in loop.q[max(k, 1) :]]
+    """Return the terms whose squares and products a polynomial in attitude, rate and momentum may be a sum of."""
+    z, stored = [poly(1), *loop.q, *loop.w], heeds_momentum([p])
+    if stored:
+        z += [*loop.H, *(a * b for a in loop.w for b in loop.H)]
+    if p.degree > 3 or stored:
+        z += [a * b for k, a in enumerate(loop.q) for b in loop.q[max(k, not stored) :]]
     elif p.degree > 2:
         z += [a * b for a in loop.q for b in loop.w]
     return z
+
+
+def heeds_momentum(parts: Sequence[Poly]) -> bool:
+    """Return whether some of these depend on the wheels' momentum."""
+    return any(not p.names.isdisjoint(MOMENTA) for p in parts)
 
 
 def loads(name: str, axis: Fraction | None, norm: Fraction | None) -> Iterator[tuple[str, Fraction, Row]]:

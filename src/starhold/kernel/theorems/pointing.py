@@ -169,7 +169,8 @@ def descends(loop: AttitudeLoop, motion: Held) -> Proof:
     misread += [("target's rate", motion.led, "rad/s"), ("target's acceleration", motion.hurried, "rad/s2")]
     begun = "V <= " + below(numbers["level"] - behind) + ", q0 > 0" * motion.even
     begun += f", w.Jw <= {below(motion.kinetic)}" if motion.kinetic is not None else ""
-    begun += f", at most {below(limiting.share)} of the limits asked for by the law for the state alone" if limiting else ""
+    alone = f"the state{' and momentum' * loop.wheels} alone"
+    begun += f", at most {below(limiting.share)} of the limits asked for by the law for {alone}" if limiting else ""
     text = bounded_motion(numbers, begun, "", misread)
     text += with_motion(motion)
     text += f", the torque that acts late, {motion.late.in_words}" if motion.late else ""
