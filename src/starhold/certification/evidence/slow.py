@@ -94,13 +94,13 @@ def bound_of_torque(
     besides = [felt(beside, letter, sizes) * motion.size(letter) for letter in "era"]
     most = 1.0 - float(motion.misread(tube.region)[0] + sum(besides, Fraction(0))) * float(each.max())
     states = on_the_border(motion, level)
-    asked = used(motion, rows, command, states)
-    if largest_of(*asked) < most:
+    torque = shares_of(motion, rows, command, states)
+    if largest_of(*torque) < most:
         return {}
     rates, more, pushed = changing(motion, tube, command, kinds_of(command))
-    speeds, paces = used(motion, rows, rates, states), PACES / float(motion.h)
+    speeds, paces = shares_of(motion, rows, rates, states), PACES / float(motion.h)
     rest = float((np.abs(rows) @ floats([more])[0] + each * float(pushed)).max())
-    needed = [largest_of(*(p + rate / pace for p, rate in zip(asked, speeds, strict=True))) + rest / pace for pace in paces]
+    needed = [largest_of(*(p + rate / pace for p, rate in zip(torque, speeds, strict=True))) + rest / pace for pace in paces]
     # Just below the best pace much more is needed, and everywhere a sum of squares needs more than these states do.
     share, pace = min((max(needed[max(k - NEARBY, 0) : k + 1]), float(pace)) for k, pace in enumerate(paces))
     share = max(share, at_first(motion, rows, angle, rate) * ROOM)
@@ -108,8 +108,9 @@ def bound_of_torque(
     return {ASKED: (share + 2.0 * most) / 3.0, ASKED_PACE: pace} if share < most else None
 
 
-def used(motion: Held, rows: Array, parts: Sequence[Poly], states: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Return what rows make of torques in some states without momentum, and what the largest one adds about each axis."""
+def shares_of(motion: Held, rows: Array, parts: Sequence[Poly], states: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Return the shares of limits that torques are in some states without momentum, and what the largest one adds about each
+    axis."""
     none, size = np.zeros(len(states["q0"])), float(motion.size("h"))
     momenta = [dict.fromkeys(MOMENTA, none) | dict.fromkeys(one, none + size) for one in ("", *zip(MOMENTA))]
     first, *others = (rows @ np.array([valued(p, {**states, **one}) + none for p in parts]) for one in momenta)
@@ -117,7 +118,7 @@ def used(motion: Held, rows: Array, parts: Sequence[Poly], states: Mapping[str, 
 
 
 def largest_of(alone: Array, turned: Array) -> float:
-    """Return the most of what `used` returns, with momentum in any direction."""
+    """Return the most of what `shares_of` returns, with momentum in any direction."""
     return float((np.abs(alone) + np.linalg.norm(turned, axis=0)).max())
 
 
@@ -140,7 +141,7 @@ def at_first(motion: Held, rows: Array, angle: float, rate: float) -> float:
     for row, along in zip(rows, rows @ floats(motion.near.torque), strict=True):
         q, w = (x / (float(np.linalg.norm(x)) or 1.0) for x in (along[TURN], along[RATE]))
         states = [np.cos(turned / 2.0), *np.outer(q, np.sin(turned / 2.0)), *np.outer(rate * w, np.ones(TURNS))]
-        most = max(most, largest_of(*used(motion, row[None], command, dict(zip(names, states, strict=True)))))
+        most = max(most, largest_of(*shares_of(motion, row[None], command, dict(zip(names, states, strict=True)))))
     return most
 
 
