@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from fractions import Fraction
@@ -179,7 +179,11 @@ class Pushed:
     @cached_property
     def leans(self) -> list[Lean]:
         """Return V with the potential as it is, the locally best first, which is taken if it descends from the whole set."""
-        leans = [self.sampled(shape) for shape in self.usual]
+        return self.best_first(self.usual)
+
+    def best_first(self, shapes: Sequence[Shape]) -> list[Lean]:
+        """Return V of some shapes, the locally best first."""
+        leans = [self.sampled(shape) for shape in shapes]
         return sorted(leans, key=lambda lean: Chain(lean.motion, lean.V, 0.0, lean.tried).aim())
 
     def sampled(self, shape: Shape) -> Lean:
@@ -292,7 +296,7 @@ class Pushed:
     def within(self, angle: float, rate: float, limits: dict[str, float]) -> Iterator[Chain]:
         """Yield chains to try within limits: of V with the potential as it is, with bounds that motions keep although the
         set holds states beyond; and of shapes whose set demands little torque."""
-        for shape in [lean.shape for lean in self.leans if lean.shape in self.usual[1:3] and lean.shape not in self.stuck]:
+        for shape in [lean.shape for lean in self.best_first(self.usual[1:3]) if lean.shape not in self.stuck]:
             whole = self.chain(shape, angle, rate)
             if slow := slowed(whole.motion, whole.level, angle, rate, limits):
                 yield self.chain(shape, angle, rate, slow)

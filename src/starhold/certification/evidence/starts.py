@@ -21,6 +21,7 @@ from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.rules import Squares
+from starhold.kernel.theorems.kinetic import ASKED
 from starhold.kernel.theorems.pointing import descends
 from starhold.loop.closed_loop import ClosedLoop
 
@@ -46,7 +47,7 @@ def begins(loop: Loop, motion: Held, numbers: Mapping[str, Any], scales: Mapping
             if not isinstance(o, Squares):
                 evidence(name, wanted, scales)
                 continue
-            if " falls " in name:
+            if ASKED in numbers and name.startswith(("motor", "torque")) and " at first " not in name:
                 # These take long, and states of the set have told what may be asked for.
                 continue
             chance, least = likely(o, scales, tried), DEFINITE
