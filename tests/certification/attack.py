@@ -56,32 +56,45 @@ class Attack(Oracle):
         n = self.numbers
         return n["level"] - n.get("late.torque.weight", 0.0) * n.get("late.torque.begun", 0.0) ** 2
 
-    def loads(self, u):
-        """The largest share of a limit, of the torque or of a motor, that torques (3, lanes) take."""
+    def rows(self):
+        """What takes a torque to its shares of limits about the axes and of motors."""
         n = self.numbers
-        used = [np.linalg.norm(u, axis=0) / n.get("limit.norm", np.inf), *np.abs(u) / n.get("limit", np.inf)]
+        rows = [np.eye(3) / n.get("limit", np.inf)]
         turned = [k for k in range(len(n)) if n.get(f"motors.{k}")]
         if turned:
             axes = np.array([[self.subject[f"wheel.{k}.axis.{i}"] for k in turned] for i in range(3)])
-            used += [*np.abs(np.linalg.pinv(axes) @ u) / np.array([[n[f"motors.{k}"]] for k in turned])]
-        return np.max(used, axis=0)
+            rows.append(np.linalg.pinv(axes) / np.array([[n[f"motors.{k}"]] for k in turned]))
+        return np.concatenate(rows)
+
+    def loads(self, u):
+        """The largest share of a limit, of the torque or of a motor, that torques (3, lanes) take."""
+        used = np.linalg.norm(u, axis=0) / self.numbers.get("limit.norm", np.inf)
+        return np.maximum(used, np.abs(self.rows() @ u).max(axis=0))
+
+    def asked(self, law, q, w, momentum):
+        """The largest share of a limit that the law asks for because of states and of this momentum, or of any that there
+        may be."""
+        if "momentum" not in self.numbers:
+            return self.loads(law(q, w))
+        none = 0.0 * w
+        if momentum is not None:
+            return self.loads(law(q, w, none, none, none, momentum))
+        ways = self.numbers["momentum"] * np.eye(3)[:, :, None]
+        u, *others = (self.rows() @ law(q, w, none, none, none, none + one) for one in (none, *ways))
+        return (np.abs(u) + np.linalg.norm(np.array(others) - u, axis=0)).max(axis=0)
 
     def kept_bounds(self, law, q, w, momentum=None):
-        """The shares of the claim's bounds of w.Jw, and of what the law asks for because of the state and of momentum, that
-        states take."""
-        n, asked = self.numbers, np.zeros(w.shape[1])
-        if "asked" in n:
-            with_it = [] if momentum is None else [np.zeros(w.shape)] * 3 + [momentum]
-            asked = self.loads(law(q, w, *with_it)) / n["asked"]
+        """The shares of the claim's bounds of w.Jw, and of what the law asks for because of state and momentum, that states
+        take, with any momentum if none is given."""
+        n = self.numbers
+        asked = self.asked(law, q, w, momentum) / n["asked"] if "asked" in n else np.zeros(w.shape[1])
         return (w * (self.J @ w)).sum(axis=0) / n.get("kinetic", np.inf), asked
 
     def into(self, law, q, w):
         """States of the set near those that are beyond its bounds of rate and torque."""
-        q, w, most = q.copy(), w.copy(), self.numbers.get("momentum")
-        # Of any momentum that flights may begin with.
-        momenta = [None] if most is None else [most * one[:, None] + 0.0 * w for one in (*np.eye(3), *-np.eye(3))]
+        q, w = q.copy(), w.copy()
         for k in range(400):
-            beyond = np.max([self.kept_bounds(law, q, w, one) for one in momenta], axis=(0, 1)) > 1.0
+            beyond = np.max(self.kept_bounds(law, q, w), axis=0) > 1.0
             if not beyond.any():
                 return q, w
             w[:, beyond] *= 0.97

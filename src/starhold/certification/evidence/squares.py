@@ -51,7 +51,9 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     p, known, fixed = settled(o)
     for count, ansatz in [(k, each) for k in counts(o) for each in ansatzes(o, p, known, k)]:
         problem = problem_of(o, p, known, ansatz, count)
-        guess = solved(problem, scales)
+        # What no column has may be so small that floats do not miss it.
+        able = p.terms.keys() <= {m for q in problem.columns for m in q.upper}
+        guess = solved(problem, scales) if able else None
         ways = [] if guess is None else [exactly] if o.least else [exactly, on_a_face]
         for way, digits in [(way, digits) for way in ways for digits in DIGITS]:
             shown = way(problem, guess, digits)
