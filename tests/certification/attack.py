@@ -2,6 +2,7 @@
 loop itself."""
 
 import math
+from functools import cached_property
 
 import numpy as np
 
@@ -56,6 +57,7 @@ class Attack(Oracle):
         n = self.numbers
         return n["level"] - n.get("late.torque.weight", 0.0) * n.get("late.torque.begun", 0.0) ** 2
 
+    @cached_property
     def rows(self):
         """What takes a torque to its shares of limits about the axes and of motors."""
         n = self.numbers
@@ -69,7 +71,7 @@ class Attack(Oracle):
     def loads(self, u):
         """The largest share of a limit, of the torque or of a motor, that torques (3, lanes) take."""
         used = np.linalg.norm(u, axis=0) / self.numbers.get("limit.norm", np.inf)
-        return np.maximum(used, np.abs(self.rows() @ u).max(axis=0))
+        return np.maximum(used, np.abs(self.rows @ u).max(axis=0))
 
     def asked(self, law, q, w, momentum):
         """The largest share of a limit that the law asks for because of states and of this momentum, or of any that there
@@ -80,7 +82,7 @@ class Attack(Oracle):
         if momentum is not None:
             return self.loads(law(q, w, none, none, none, momentum))
         ways = self.numbers["momentum"] * np.eye(3)[:, :, None]
-        u, *others = (self.rows() @ law(q, w, none, none, none, none + one) for one in (none, *ways))
+        u, *others = (self.rows @ law(q, w, none, none, none, none + one) for one in (none, *ways))
         return (np.abs(u) + np.linalg.norm(np.array(others) - u, axis=0)).max(axis=0)
 
     def kept_bounds(self, law, q, w, momentum=None):

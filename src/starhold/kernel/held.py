@@ -19,7 +19,7 @@ from .near import CHANGE, between, form_of, near_target
 from .norms import Norms
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .plans import PLANNED, Plan
-from .polynomials import Poly, apply, cross, dot, fastest, largest, minus, most, total, var, variables
+from .polynomials import Poly, apply, cross, derivatives, dot, fastest, largest, minus, most, total, var, variables
 from .regions import (
     AMISS,
     ANGLE,
@@ -49,7 +49,7 @@ from .regions import (
     with_momentum,
 )  # fmt: skip
 
-WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
+WEIGHT, ZERO = Fraction(8), Fraction(0)
 NEARER = Fraction(17, 16)
 """Errors that grow with the motion count as settled within this factor of their limit."""
 
@@ -167,11 +167,8 @@ class Held(Follower):
     def motion(self) -> tuple[Factored, Poly, Fraction]:
         """Return the mean of -V' over a period without disturbances, up to a derivative of V', then that derivative, and its
         share in the mean: the law's torque is held, and wheels' momentum turns against the body."""
-        rates, shares = [self.rate], [Fraction(1)]
-        while len(rates) < ORDER and len(rates[-1].upper) < LONG:
-            rates.append(self.further(rates))
-            shares.append(shares[-1] * self.h / len(rates))
-        return factored(-self.by_law(rates, shares)), rates[-1], shares[-1] * self.h / (len(rates) + 1)
+        rates, shares, last = derivatives(self.rate, self.further, self.h)
+        return factored(-self.by_law(rates, shares)), rates[-1], last
 
     def along(self, p: Poly) -> Poly:
         """Return the derivative of an expression of the state and of wheels' momentum in a period."""

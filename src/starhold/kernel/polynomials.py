@@ -16,6 +16,8 @@ Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
 
 DEGREE, TERMS, ZERO = 24, 100_000, Fraction(0)
+ORDER, LONG = 4, 800
+"""How many derivatives a mean is expanded in, and how many terms the last but one has at most."""
 
 
 class Poly:
@@ -209,6 +211,18 @@ def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fractio
     ((along,),) = largest([[p]], sizes, dict(zip(changing, numbers, strict=True)))
     still = (most(p.slope(name), sizes) * speeds[name] for name in moving if not sizes[name])
     return sum(still, along / lower)
+
+
+def derivatives(
+    first: Poly, further: Callable[[list[Poly]], Poly], h: Fraction
+) -> tuple[list[Poly], list[Fraction], Fraction]:
+    """Return successive derivatives, up to one that is long, their shares in the mean of the first over a time, by Taylor,
+    and the share of a bound of the derivative of the last. further: the derivative that follows some."""
+    rates, shares = [first], [Fraction(1)]
+    while len(rates) < ORDER and len(rates[-1].upper) < LONG:
+        rates.append(further(rates))
+        shares.append(shares[-1] * h / len(rates))
+    return rates, shares, shares[-1] * h / (len(rates) + 1)
 
 
 def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from fractions import Fraction
 
-from ..held import LONG, ORDER, Held
+from ..held import Held
 from ..norms import Norms, norms, total_of
 from ..numbers import demand, norm
-from ..polynomials import Poly, apply, dot, fastest
+from ..polynomials import Poly, apply, derivatives, dot, fastest
 from ..regions import ANGLE, SPEED, Tube, felt, stretch
 from ..rules import Exceeds, Part, Squares
 from .attitude import within_turn
@@ -77,13 +77,10 @@ def mean_rate(motion: Held, p: Poly, kinds: Collection[str]) -> tuple[Poly, Norm
     factors of these letters, and bounds of the rest; then that derivative while the torque is held, and its share in it."""
     key = *kinds, p.lower, *p.upper.items()
     if key not in motion.rates:
-        rates, shares = [motion.along(p)], [Fraction(1)]
-        while len(rates) < ORDER and len(rates[-1].upper) < LONG:
-            rates.append(motion.along(rates[-1]))
-            shares.append(shares[-1] * motion.h / len(rates))
+        rates, shares, last = derivatives(motion.along(p), lambda rates: motion.along(rates[-1]), motion.h)
         mean = dot(shares, rates).at(motion.commanded)
         short = mean.only(lambda m: "".join(sorted(name[0] for name in m)) in kinds)
-        motion.rates[key] = short, norms(mean - short), rates[-1], shares[-1] * motion.h / (len(rates) + 1)
+        motion.rates[key] = short, norms(mean - short), rates[-1], last
     return motion.rates[key]
 
 

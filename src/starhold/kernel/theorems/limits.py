@@ -68,8 +68,9 @@ def within_limits(
     vectors = [("target.rate", loop.r, "a target that turns at up to {} rad/s")] * loop.moving
     vectors += [("target.acceleration", loop.a, "a target that speeds up by up to {} rad/s^2")] * loop.moving
     vectors += [("momentum", loop.H, "a momentum of up to {} N m s")] * loop.wheels
+    balls = [numbers[name] * numbers[name] - dot(vector, vector) for name, vector, _ in vectors]
+    known += balls
     for name, vector, text in vectors:
-        known.append(numbers[name] * numbers[name] - dot(vector, vector))
         bounded.append(vector)
         bounds.append(text.format(below(numbers[name])))
     assumed += ["bounded-target"] * loop.moving + ["bounded-momentum"] * loop.wheels + unlimited
@@ -119,10 +120,9 @@ def within_limits(
                 yield full, within(bound, load, z, w, [*case.known, *squared * turned, *known], [loop.sphere])
     if asking is not None:
         for what, place, room, left in approached:
-            z, ball = [poly(1), *q, *w], list[Poly]()
-            if heeds_momentum([room]):
-                z += loop.H
-                ball = [numbers["momentum"] ** 2 - dot(loop.H, loop.H)]
+            # That of momentum is the last.
+            momentum, ball = (loop.H, balls[-1:]) if heeds_momentum([room]) else ([], [])
+            z = [poly(1), *q, *w, *momentum]
             first = Squares(room.at(asking.still), z, 0, [*asking.begun, *ball], [loop.sphere])
             yield f"{what} at first {place}", first
             turned = [x * x * p for x in w for p in ball]
