@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tests.certification.attack import Attack
-from tests.kernel.flights import along
+from tests.certification.extremal import Leaning
+from tests.kernel.flights import along, seen
 
 STARTS, PERIODS, FARTHEST = 40, 2000, 100.0
 """How many starts are flown from, the most periods, and how many times the claimed start the farthest is."""
@@ -74,6 +75,8 @@ class Limited(Attack):
         turning = rates * fleet.directions()
         # Some fly outwards.
         turning[:, ::4] = (rates * along(begun[1:]))[:, ::4]
+        if self.count:
+            self.load(fleet, law, begun, turning)
         unclipped = np.ones(lanes, dtype=bool)
         for k, q, w in fleet.fly(begun, turning, PERIODS, 1):
             if k % 10 == 0 or k < 10:
@@ -85,6 +88,32 @@ class Limited(Attack):
                 if arrived.all():
                     break
         return arrived, arrived & unclipped
+
+    def load(self, fleet, law, begun, turning):
+        """Begin every other lane where the law asks for as much of a motor as it does anywhere at that angle and rate, with
+        the worst momentum and target; or, a fourth of the lanes, where a wheel stores as much as it may."""
+        n, lanes, none = self.numbers, np.arange(self.lanes), np.zeros((3, self.lanes))
+        pyramid = np.linalg.pinv(self.axes)
+        side = np.where(lanes % 4 == 1, -1.0, 1.0) * np.where(lanes // 4 % 2, -1.0, 1.0)
+        rows = side * (pyramid / self.motors)[lanes // 8 % len(pyramid)].T
+        damping, stiffness = self.linear()
+        steered, stored = lanes % 2 == 1, lanes % 4 == 3
+        angle, rate = np.linalg.norm(begun[1:], axis=0), np.linalg.norm(turning, axis=0)
+        q = np.concatenate([begun[:1], -angle * along(stiffness.T @ rows)])
+        w = -rate * np.where(stored, -along(self.true.T @ rows), along(damping.T @ rows))
+
+        def steepest(of):
+            """The vector that adds most to what is asked for in the direction of each lane's row."""
+            return along(np.stack([(rows * (of(none + axis[:, None]) - of(none))).sum(axis=0) for axis in np.eye(3)]))
+
+        momentum = n["momentum"] * np.where(stored, along(rows), steepest(lambda h: law(q, w, none, none, none, h)))
+        target = steepest(lambda r: law(q, w, none, r, none, momentum))
+        around = Leaning(fleet.around, self.true, fleet.inverse, seen(q * [[1], [-1], [-1], [-1]], target), momentum)
+        usual = fleet.surroundings(fleet.around, self.true, fleet.inverse, fleet.rng, self.lanes)
+        around.axis, around.kept = (np.where(steered, *pair) for pair in ((around.axis, usual.axis), (momentum, usual.kept)))
+        around.phase = np.where(steered, 0.0, usual.phase)
+        fleet.surroundings = lambda *_: around
+        begun[:, steered], turning[:, steered] = q[:, steered], w[:, steered]
 
     def border(self):
         """The largest starts from which all flights in all directions came home."""

@@ -1,6 +1,6 @@
 """Evidence that is taken from a sum's mirror image."""
 
-from starhold.certification.evidence.mirrored import shown_once
+from starhold.certification.evidence.mirrored import different, shown_once
 from starhold.certification.evidence.squares import squares
 from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import dot, poly, variables
@@ -38,8 +38,24 @@ def test_what_is_no_mirror_image_is_searched_for():
     Account.open()
     assert shown(limited(1, 5))[1] == 1
     assert shown(limited(-1, 6))[1] == 1
-    # What is known differs in a sign that the sum's mirror image has not.
-    assert shown(limited(-1, 5, [-x for x in w]))[1] == 1
+    # What is known differs.
+    assert shown(limited(-1, 5, [2 * x for x in w]))[1] == 1
+    # Where all three are turned, no image differs in one of them alone.
+    product = w[0] * w[1] * w[2]
+    sums = [Squares(9 - sign * product, [poly(1), *w], 0, [2 - product]) for sign in (1, -1)]
+    assert different(sums) == sums
+
+
+def test_a_limit_about_half_turned_axes_has_the_evidence_of_its_image():
+    Account.open()
+
+    def leaning(*signs):
+        return Squares(4 - dot(signs, w), [poly(1), *w], 0, [1 - dot(w, w)])
+
+    assert shown(leaning(1, 2, 3))[1] == 1
+    sums = [leaning(*signs) for signs in ((1, 2, 3), (1, -2, -3), (-1, -2, 3), (-1, -2, -3), (1, 2, -3), (2, 1, 3))]
+    assert [shown(o)[1] for o in sums] == [1, 0, 0, 0, 0, 1]
+    assert different(sums) == [sums[0], sums[-1]]
 
 
 def test_a_sum_without_evidence_is_searched_for_each_time():

@@ -61,7 +61,9 @@ class Held(Follower):
         numbers, x = loop.claim.numbers, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
         self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
-        self.rates = dict[Any, tuple[Poly, Norms, Poly, Fraction]]()  # What `mean_rate` returned.
+        # What `mean_rate` returned, and `changing` for a tube.
+        self.rates = dict[Any, tuple[Poly, Norms, Poly, Fraction]]()
+        self.changed = dict[Any, tuple[Tube, Any]]()
         # What noise adds near the target, and what momentum adds to that.
         self.swayed = self.apart = AT_REST
         self.random = numbers.get("noise.torque") or ZERO

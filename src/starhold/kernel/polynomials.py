@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property, reduce
 from itertools import product
-from math import gcd, lcm
+from math import gcd, lcm, prod
 from operator import mul
 from typing import Any, TypeAlias, cast
 
@@ -177,7 +177,8 @@ def largest(rows: Sequence[Sequence[Poly]], sizes: Mapping[str, Fraction], share
     as those of its factors do together."""
     names = [*set[str]().union(*(p.names for row in rows for p in row))]
     numbers, below = whole([sizes[name] for name in names])
-    ratios, bits = dict(zip(names, numbers, strict=True)), max(map(int.bit_length, (below, *numbers)))
+    bits, size = max(map(int.bit_length, (below, *numbers))), dict(zip(names, numbers, strict=True)).__getitem__
+    share = None if shares is None else {name: shares.get(name, 0) for name in names}.__getitem__
 
     def bound(p: Poly) -> Fraction:
         if not p.upper:
@@ -186,12 +187,7 @@ def largest(rows: Sequence[Sequence[Poly]], sizes: Mapping[str, Fraction], share
         # The sums of the terms of each degree.
         sums = [0] * (p.degree + 1)
         for m, c in p.upper.items():
-            c = abs(c)
-            if shares is not None:
-                c *= sum([shares.get(name, 0) for name in m])
-            for name in m:
-                c *= ratios[name]
-            sums[len(m)] += c
+            sums[len(m)] += prod(map(size, m)) * abs(c) * (1 if share is None else sum(map(share, m)))
         return up(Fraction(reduce(lambda higher, terms: higher * below + terms, sums), p.lower * below**p.degree))
 
     return [list(map(bound, row)) for row in rows]

@@ -13,6 +13,7 @@ import numpy as np
 
 from starhold.certification.evidence.cones import once
 from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.mirrored import different
 from starhold.certification.evidence.recorded import RecordedLoop, curvature, sign_words
 from starhold.certification.evidence.squares import combined, largest_number, posed, solved, squares
 from starhold.kernel.loops import HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
@@ -226,7 +227,7 @@ class Loop(RecordedLoop):
         if "V is non-increasing" not in wanted:
             # A limit on a clipped torque may hold at any level.
             limits = [o for o in limits if squares(replace(o, known=o.known[:-1]), self.scales(V)) is None]
-        level = cap
+        level, limits = cap, different(limits)
         for _ in range(3):
             scales = self.scales(V, level if isfinite(level) else None)
             levels = [highest(o, scales) for o in limits]

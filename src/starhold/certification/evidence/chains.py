@@ -33,7 +33,7 @@ the largest ratio of successive levels; the most levels and ellipsoids."""
 SMALLER, FAR = 4, 0.05
 """The ratio of the levels that tell how disturbances weigh in sets of different size; and by how much a form, in units of
 its diagonal, has to be indefinite not to count as a near miss."""
-LOWER, SHORTEST, WORTH, ALIKE = 0.9, 0.12, 1.003, 1.005
+LOWER, SHORTEST, WORTH, ALIKE = 0.97, 0.12, 1.003, 1.005
 """The share of a level that the next one is at most; the least share of the largest ratio, in powers; up to which multiple
 of the last bound no further response is worth its time, and up to which multiple of another a bound counts as no wider."""
 

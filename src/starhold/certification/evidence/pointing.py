@@ -43,11 +43,14 @@ from starhold.parts.craft import tensor
 linalg: Any = import_module("scipy.linalg")
 Array = NDArray[np.float64]
 
-ANGLES = (175, 150, 120, 105, 90, 75, 60, 52, 45, 40, 35, 30, 25, 22, 20, 17, 15, 12, 10, 8, 7, 6, 5, 4, 3, 2, 1, 0.5)
+ANGLES = (
+    *(175, 165, 150, 135, 120, 112, 105, 97, 90, 86, 80, 75, 67, 60, 52, 45, 40, 35, 30, 25, 22, 20, 17, 15, 12),
+    *(10, 8, 7, 6, 5, 4, 3, 2, 1, 0.5),
+)
 """The initial rotations (deg) from which convergence is attempted."""
 RATES = (5, 3, 2, 1)
 """The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
-WORTH = 0.82
+WORTH = 0.75
 """The share of the largest possible rotation that is worth to begin at a higher rate."""
 NEARLY = 10.0
 """A chain of levels that ends below this multiple of its `aim` is taken, and no other one is looked for."""
@@ -95,23 +98,17 @@ def finds(first: Pushed, tried: list[Beginning]) -> bool:
     both = [first]
     if first.even:
         other, (angles, rate, limits, beyond) = first.by_another(), tried[0]
-        start = other.start(*tried[0])
-
-        def may_begin(farther: tuple[float, float]) -> bool:
-            return first.kept(first.may_begin, *farther, limits)
-
-        def larger(start: tuple[float, float]) -> tuple[float, float] | None:
-            faster = start[0], min((x for x in (*beyond, rate) if x > start[1]), default=start[1])
-            farther = min((x for x in angles if x > start[0]), default=start[0]), start[1]
-            return next((one for one in (faster, farther) if one != start and may_begin(one)), None)
-
-        if start[0]:
-            while (more := larger(start)) is not None:
-                start = more
-            if first.find(*start, limits):
-                first.explain(start)
-                return True
-        both = [other, first] if start[0] else [first, other]
+        start = first.start(*tried[0])
+        faster = start[0], min((x for x in (*beyond, rate) if x > start[1]), default=start[1])
+        farther = min((x for x in angles if x > start[0]), default=start[0]), start[1]
+        larger = [one for one in (faster, farther) if start[0] and one != start]
+        if any(other.may_begin(*one, limits) for one in larger) or not start[0]:
+            both = [other, first]
+        elif first.find(*start, limits):
+            first.explain(start)
+            return True
+        else:
+            both = [first, other]
     return any(pushed.find_largest(*one) for pushed in both for one in tried)
 
 
@@ -181,6 +178,11 @@ class Pushed:
         """Return V with the potential as it is, the locally best first, which is taken if it descends from the whole set."""
         return self.best_first(self.usual)
 
+    @cached_property
+    def slowest(self) -> list[Lean]:
+        """Return those of them for which bounds that motions keep are looked for."""
+        return self.best_first(self.usual[1:3])
+
     def best_first(self, shapes: Sequence[Shape]) -> list[Lean]:
         """Return V of some shapes, the locally best first."""
         leans = [self.sampled(shape) for shape in shapes]
@@ -221,26 +223,29 @@ class Pushed:
     ) -> Iterator[tuple[float, tuple[float, ...]]]:
         """Yield the rotations to begin from, the largest first, each with the rates to begin at there."""
 
-        def starting(angle: float) -> bool:
+        def may(angle: float, rate: float = rate) -> bool:
             return self.kept(self.may_begin, angle, rate, limits)
 
         def far_enough(angle: float) -> bool:
-            return starting(angle) or self.too_near((angle, rate, *limits.items()))
+            return may(angle) or self.too_near((angle, rate, *limits.items()))
 
         # A start within a smaller set is also within the larger one. Where none begins, sets may be too small for their V.
-        first = bisect_left(angles, True, key=starting)
+        first = bisect_left(angles, True, key=may)
         if first == len(angles):
             first = bisect_left(angles, True, key=far_enough)
         faster = [one for one in beyond if one > rate > 0.0]
 
         def fastest(angle: float) -> tuple[float, ...]:
-            place = bisect_left(faster, True, key=lambda one: self.kept(self.may_begin, angle, one, limits))
+            place = bisect_left(faster, True, key=lambda one: may(angle, one))
             return *faster[place : place + 1], rate
 
         near = [angle for angle in angles[first:] if faster and angle >= WORTH * angles[first]]
-        # A somewhat smaller angle is worth a higher rate.
-        ways = [(angle, fastest(angle)) for angle in near[:: max(len(near) - 1, 1)]]
-        yield from sorted(ways, key=lambda way: way[1][0], reverse=True)
+        if near:
+            # A somewhat smaller angle is worth a higher rate.
+            slow, fast = fastest(near[0]), fastest(near[-1])
+            if fast[0] > slow[0]:
+                yield next(angle for angle in near[1:] if may(angle, fast[0])), fast
+            yield near[0], slow
         for angle in angles[first + bool(near) :]:
             if self.too_near((angle, rate, *limits.items())):
                 break
@@ -296,7 +301,7 @@ class Pushed:
     def within(self, angle: float, rate: float, limits: dict[str, float]) -> Iterator[Chain]:
         """Yield chains to try within limits: of V with the potential as it is, with bounds that motions keep although the
         set holds states beyond; and of shapes whose set demands little torque."""
-        for shape in [lean.shape for lean in self.best_first(self.usual[1:3]) if lean.shape not in self.stuck]:
+        for shape in [lean.shape for lean in self.slowest if lean.shape not in self.stuck]:
             whole = self.chain(shape, angle, rate)
             if slow := slowed(whole.motion, whole.level, angle, rate, limits):
                 yield self.chain(shape, angle, rate, slow)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.certification.evidence.shapes import on_border, shares
+from starhold.certification.evidence.squares import CLEAR, definiteness
 from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
@@ -25,6 +26,7 @@ from starhold.kernel.theorems.kinetic import (
     changing,
     kinds_of,
     mean_rate,
+    slowing,
     twice_energy,
 )  # fmt: skip
 
@@ -32,11 +34,11 @@ Array = NDArray[np.float64]
 
 PACES = np.geomspace(3e-3, 1.0, 60)
 """The paces that are tried, in units of one period."""
-WIDER, ROUNDS = 1.03, 8
+WIDER, ROUNDS = 1.03, 12
 """The ratio of bounds that are tried, and how many are."""
-ROOM, TURNS, STATES, NEARBY = 1.005, 50, 6000, 2
-"""How much more of a limit the law may ask for than it does at first, how many turns and how many states of a set are
-examined, and at how many lower paces a share has to do."""
+ROOM, FREE, TURNS, STATES, NEARBY, COARSE = 1.005, 0.8, 50, 6000, 1, 6
+"""How much more of a limit the law may ask for than it does at first, up to which share of its limits nothing needs to bound
+what it asks for, how many turns and how many states of a set are examined, and at how many lower paces a share has to do."""
 
 
 def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[str, Any]) -> dict[str, float]:
@@ -58,27 +60,32 @@ def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[s
 def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
     """Return the numbers of a bound of w.Jw that seems to hold, as small as possible; none where there is none."""
     motion.kinetic = None
-    G, region, paces = twice_energy(motion), motion.region(Fraction(level)), PACES / float(motion.h)
+    G, paces, region = twice_energy(motion), PACES / float(motion.h), motion.region(Fraction(level))
+    states = on_the_border(motion, level)
     changed = mean_rate(motion, G, QUARTIC)[0]
-    ends = [form_of(changed, q0) for q0 in (Fraction(1), max(region.least, Fraction(0)))]
-    root, energy = np.linalg.inv(np.linalg.cholesky(floats(motion.under))), energy_of(motion)
-    begun = float(np.linalg.norm(energy, 2)) * rate**2
-
-    def most(form: Array) -> float:
-        return level * float(np.linalg.eigvalsh(root @ form @ root.T)[-1])
-
-    needed, whole = np.array([max(most(energy + end / pace) for end in ends) for pace in paces]), most(energy)
-    bound = max(float(needed.min()), begun)
+    # Slower states are inside: both are of second degree in the rate.
+    parts = [of_rate(p, states) for p in (G, changed)]
+    needed = np.array([most_within(*(g + rate / pace for g, rate in zip(*parts, strict=True))) for pace in paces])
+    begun, whole = float(np.linalg.norm(floats(motion.loop.given), 2)) * rate**2, float(parts[0][2].max())
+    bound, scales = WIDER * max(float(needed.min()), begun), {name: float(region.sizes[name]) for name in STATE}
+    before = 0.0, 0.0
     for _ in range(ROUNDS):
-        bound *= WIDER
         if bound >= whole:
             break
         motion.kinetic = Fraction(bound)
-        _, (more,), pushed = changing(motion, motion.tube(motion.region(Fraction(level))), [G], QUARTIC)
+        tube = motion.tube(motion.region(Fraction(level)))
+        _, (more,), pushed = changing(motion, tube, [G], QUARTIC)
         after = needed + float(more + pushed) / paces
-        if max(float(after.min()), begun) < bound:
-            return {KINETIC: bound, PACE: float(paces[int(np.argmin(after))])}
-        bound = max(float(after.min()), begun)
+        least, pace = max(float(after.min()), begun), float(paces[int(np.argmin(after))])
+        if least < bound:
+            clear = definiteness(slowing(motion, tube, motion.kinetic, Fraction(pace), Fraction(level)), scales)
+            if clear is not None and clear >= CLEAR:
+                return {KINETIC: bound, PACE: pace}
+            bound *= WIDER
+            continue
+        # Where the bound would be the least of itself, along a line.
+        grows = (least - before[1]) / (bound - before[0]) if any(before) else 0.0
+        before, bound = (bound, least), WIDER * ((least - grows * bound) / (1.0 - grows) if grows < 1.0 else least)
     motion.kinetic = None
     return {}
 
@@ -87,25 +94,38 @@ def bound_of_torque(
     motion: Held, tube: Tube, level: float, angle: float, rate: float, rows: Array
 ) -> dict[str, float] | None:
     """Return the numbers of a bound of what the law asks for because of state and momentum that seems to hold; none where it
-    asks for no more than its limits anyway, and None where there is no bound. rows: what takes the torque to shares of its
-    limits."""
+    asks for less than its limits anyway, clearly so or without a bound, and None where it does not. rows: what takes the
+    torque to shares of its limits."""
     command, each, sizes = alone(motion), np.linalg.norm(rows, axis=1), tube.region.sizes
     beside = minus(motion.loop.u, command)
     besides = [felt(beside, letter, sizes) * motion.size(letter) for letter in "era"]
     most = 1.0 - float(motion.misread(tube.region)[0] + sum(besides, Fraction(0))) * float(each.max())
     states = on_the_border(motion, level)
     torque = shares_of(motion, rows, command, states)
-    if largest_of(*torque) < most:
+    if (largest := largest_of(*torque)) < FREE * most:
         return {}
     rates, more, pushed = changing(motion, tube, command, kinds_of(command))
     speeds, paces = shares_of(motion, rows, rates, states), PACES / float(motion.h)
     rest = float((np.abs(rows) @ floats([more])[0] + each * float(pushed)).max())
-    needed = [largest_of(*(p + rate / pace for p, rate in zip(torque, speeds, strict=True))) + rest / pace for pace in paces]
+
+    def needed(place: int) -> float:
+        if place not in known:
+            pace = paces[place]
+            known[place] = largest_of(*(p + rate / pace for p, rate in zip(torque, speeds, strict=True))) + rest / pace
+        return known[place]
+
+    known, few = dict[int, float](), range(0, len(paces), COARSE)
+    best = min(few, key=needed)
     # Just below the best pace much more is needed, and everywhere a sum of squares needs more than these states do.
-    share, pace = min((max(needed[max(k - NEARBY, 0) : k + 1]), float(pace)) for k, pace in enumerate(paces))
+    share, place = min(
+        (max(map(needed, range(max(k - NEARBY, 0), k + 1))), k)
+        for k in range(max(best - COARSE, 0), min(best + COARSE + NEARBY + 1, len(paces)))
+    )
+    pace = float(paces[place])
     share = max(share, at_first(motion, rows, angle, rate) * ROOM)
     # What the rest of the torque leaves, but for some room that it needs too.
-    return {ASKED: (share + 2.0 * most) / 3.0, ASKED_PACE: pace} if share < most else None
+    bound = {ASKED: (share + 2.0 * most) / 3.0, ASKED_PACE: pace}
+    return bound if share < most else {} if largest < most else None
 
 
 def shares_of(motion: Held, rows: Array, parts: Sequence[Poly], states: Mapping[str, Array]) -> tuple[Array, Array]:
@@ -123,9 +143,12 @@ def largest_of(alone: Array, turned: Array) -> float:
 
 
 def on_the_border(motion: Held, level: float) -> dict[str, Array]:
-    """Return states of {V <= level}, as far as w.Jw is within its bound, that turn as fast there along some direction."""
+    """Return states of {V <= level}, as far as w.Jw is within its bound, that turn as fast there along some direction, many
+    of them more or less back to the target, where most is asked for."""
     r = np.random.default_rng(1)
     along, axes = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2, 3, STATES)))
+    along[:, ::2] = (r.uniform(size=STATES) * along - axes)[:, ::2]
+    along /= np.linalg.norm(along, axis=0)
     half, slow = r.uniform(0.0, np.pi / (1 + motion.even), STATES), None
     if motion.kinetic is not None:
         slow = floats(motion.loop.given) / float(motion.kinetic)
@@ -145,14 +168,15 @@ def at_first(motion: Held, rows: Array, angle: float, rate: float) -> float:
     return most
 
 
-def energy_of(motion: Held) -> Array:
-    """Return the matrix of w.Jw in (w, q)."""
-    energy = np.zeros((6, 6))
-    energy[RATE, RATE] = floats(motion.loop.given)
-    return energy
+def of_rate(p: Poly, states: Mapping[str, Array]) -> list[Array]:
+    """Return the parts of a function of degree zero, one and two in the rate."""
+    still, half, whole = (
+        valued(p, {name: x * share if name[0] == "w" else x for name, x in states.items()}) for share in (0.0, 0.5, 1.0)
+    )
+    return [still, 4.0 * half - 3.0 * still - whole, 2.0 * (still + whole) - 4.0 * half]
 
 
-def form_of(p: Poly, q0: Fraction) -> Array:
-    """Return the matrix of a form in (w, q) that a polynomial is at some q0."""
-    at, zero = p.at({"q0": q0}), dict.fromkeys(STATE, 0)
-    return floats([[at.slope(i).slope(k).at(zero).number / 2 for k in STATE] for i in STATE])
+def most_within(still: Array, linear: Array, square: Array) -> float:
+    """Return the largest still + linear x + square x^2 for x from 0 to 1."""
+    x = np.where(square < 0.0, np.clip(linear / np.maximum(-2.0 * square, 1e-300), 0.0, 1.0), 1.0)
+    return float(np.maximum(still, still + linear * x + square * x * x).max())

@@ -29,7 +29,7 @@ DIGITS = (12, 14, 9, 16)
 SINGULAR, SHORT = 1e-6, 8
 """The share of the largest eigenvalue below which a matrix counts as singular, and the denominators of what it takes to
 zero."""
-DEFINITE = -1e-8
+DEFINITE, CLEAR = -1e-8, 1e-6
 """The least eigenvalue, in scaled units, at which it is worth trying whether the exact matrix is definite."""
 
 

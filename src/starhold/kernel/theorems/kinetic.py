@@ -31,14 +31,20 @@ def stays_slow(motion: Held, tube: Tube) -> Part[list[Poly]]:
     loop, numbers = motion.loop, motion.loop.claim.numbers
     if (bound := motion.kinetic) is None:
         return []
-    pace, G = numbers[PACE], twice_energy(motion)
+    pace = numbers[PACE]
     demand(0 < motion.h * pace <= 1 and "rate" not in numbers, "a bound of the rate is not properly approached")
     if "start.rate" in numbers:
         yield "rate at first", Exceeds(bound, stretch(loop.given) * numbers["start.rate"] ** 2)
+    yield "rate falls", slowing(motion, tube, bound, pace, numbers["level"])
+    return [bound - twice_energy(motion)]
+
+
+def slowing(motion: Held, tube: Tube, bound: Fraction, pace: Fraction, level: Fraction) -> Squares:
+    """Return what shows that w.Jw approaches a bound at most at a pace on {V <= level}."""
+    loop, G = motion.loop, twice_energy(motion)
     (changed,), (rest,), pushed = changing(motion, tube, [G], QUARTIC)
     left = pace * (bound - G) - changed - rest - pushed
-    yield "rate falls", Squares(left, basis(loop, left), 0, [numbers["level"] - loop.lyapunov], [loop.sphere])
-    return [bound - G]
+    return Squares(left, basis(loop, left), 0, [level - loop.lyapunov], [loop.sphere])
 
 
 def asking(motion: Held, tube: Tube) -> Asking | None:
@@ -90,13 +96,17 @@ def changing(
     """Return polynomials with terms of these kinds, numbers, and a number for a vector, that together are at least the mean
     rates of change of functions of q and w from one sample to the next: by Taylor in the motion without disturbances, and by
     as far as these move the state."""
-    sizes, h, speeds = tube.sizes, motion.h, motion.speeds(tube.sizes)
-    lengths = {"w": tube.region.sizes[SPEED], "q": tube.region.sizes[ANGLE]} | motion.extents
-    moved_by, calm = motion.mover(tube)
-    away = norm(moved_by(tube.steady + tube.pushed + tube.late.moved + calm)) / h
-    # Momentum turns with the target too, grows by torques from outside, and turns with a body that is moved.
-    turned = 2 * motion.changes(sizes, 0)["h"] / h + h / 2 * away * motion.size("h")
-    rates = [mean_rate(motion, p, kinds) for p in parts]
-    rest = [total_of(bounds, lengths) + share * fastest(last, sizes, speeds) for _, bounds, last, share in rates]
-    moved = away * (felt([*parts], "w", sizes) + h / 4 * felt([*parts], "q", sizes))
-    return [p for p, *_ in rates], rest, moved + turned * felt([*parts], "h", sizes)
+    sizes, h, rates = tube.sizes, motion.h, [mean_rate(motion, p, kinds) for p in parts]
+    key = id(tube), *(id(last) for _, _, last, _ in rates)
+    if key not in motion.changed:
+        speeds = motion.speeds(sizes)
+        lengths = {"w": tube.region.sizes[SPEED], "q": tube.region.sizes[ANGLE]} | motion.extents
+        moved_by, calm = motion.mover(tube)
+        away = norm(moved_by(tube.steady + tube.pushed + tube.late.moved + calm)) / h
+        # Momentum turns with the target too, grows by torques from outside, and turns with a body that is moved.
+        turned = 2 * motion.changes(sizes, 0)["h"] / h + h / 2 * away * motion.size("h")
+        rest = [total_of(bounds, lengths) + share * fastest(last, sizes, speeds) for _, bounds, last, share in rates]
+        moved = away * (felt([*parts], "w", sizes) + h / 4 * felt([*parts], "q", sizes))
+        # With the tube, so that no other one gets its identity.
+        motion.changed[key] = tube, (rest, moved + turned * felt([*parts], "h", sizes))
+    return [p for p, *_ in rates], *motion.changed[key][1]
