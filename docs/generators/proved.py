@@ -33,7 +33,7 @@ SCENARIOS = ("three-laws", "geostationary", "wheels-orbital", "flexible-slew", "
 REST = "all of these"
 LONGER, MOST = 2, 1e6
 """A flight lasts at least so many times the time after which the bound holds."""
-LANES, FEWER, LASTING, SWAYING, ROUNDS, DIRECTIONS = 2500, 250, 1000, 32, 4, 24
+LANES, FEWER, LASTING, SWAYING, ROUNDS, DIRECTIONS = 2500, 250, 1000, 32, 4, 32
 """Flights of a round, of one of flights with more samples than the third number, and of one with appendages; rounds;
 directions of each start."""
 MISSING = "—"

@@ -90,17 +90,15 @@ class Limited(Attack):
         return arrived, arrived & unclipped
 
     def load(self, fleet, law, begun, turning):
-        """Begin every other lane where the law asks for as much of a motor as it does anywhere at that angle and rate, with
-        the worst momentum and target; or, a fourth of the lanes, where a wheel stores as much as it may."""
-        n, lanes, none = self.numbers, np.arange(self.lanes), np.zeros((3, self.lanes))
-        pyramid = np.linalg.pinv(self.axes)
-        side = np.where(lanes % 4 == 1, -1.0, 1.0) * np.where(lanes // 4 % 2, -1.0, 1.0)
-        rows = side * (pyramid / self.motors)[lanes // 8 % len(pyramid)].T
+        """Begin every other lane of a start where the law asks for as much of a motor as it does anywhere at that angle and
+        rate, with the worst momentum and target, or where a wheel stores as much as it may."""
+        n, none, ways = self.numbers, np.zeros((3, self.lanes)), np.arange(self.lanes) % (self.lanes // STARTS)
+        pyramid, steered, stored = np.linalg.pinv(self.axes), ways % 2 == 1, ways // 2 % 2 == 1
+        rows = (1.0 - 2.0 * (ways // 4 % 2)) * (pyramid / self.motors)[ways // 8 % len(pyramid)].T
         damping, stiffness = self.linear()
-        steered, stored = lanes % 2 == 1, lanes % 4 == 3
         angle, rate = np.linalg.norm(begun[1:], axis=0), np.linalg.norm(turning, axis=0)
         q = np.concatenate([begun[:1], -angle * along(stiffness.T @ rows)])
-        w = -rate * np.where(stored, -along(self.true.T @ rows), along(damping.T @ rows))
+        w = -rate * np.where(stored, along(self.true.T @ rows), along(damping.T @ rows))
 
         def steepest(of):
             """The vector that adds most to what is asked for in the direction of each lane's row."""

@@ -87,12 +87,14 @@ def test_extremal_flights_of_the_cubesat_end_near_its_bound(law, least):
     assert rounds[1] > 0.99 * rounds[0]
 
 
+# Farther off the motors turn as fast as they can: the cubesat's on the way, at a quarter turn the others at once, with the
+# worst momentum.
 @pytest.mark.slow
-def test_the_cubesat_comes_home_within_its_limits_from_where_that_is_proved():
-    scenario = sh.load("cubesat-nadir")
+@pytest.mark.parametrize(("name", "most"), [("cubesat-nadir", 10.0), ("wheels-orbital", 1.3)])
+def test_flights_come_home_within_the_limits_from_where_that_is_proved(name, most):
+    scenario = sh.load(name)
     entry = scenario.pick("wheel")
     for one in STUDY.certify(scenario, entry, build(scenario, entry), pointing=True):
-        border = Limited(*given(one.certificate.claim("pointing")), 1, 16).border()
+        border = Limited(*given(one.certificate.claim("pointing")), 1, 32).border()
         assert border.home >= border.within >= 1.0
-        # Farther off the motors turn as fast as they can.
-        assert border.within < 10.0
+        assert border.within < most

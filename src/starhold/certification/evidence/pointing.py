@@ -58,7 +58,7 @@ LEAST = 1e-6
 """The deflection (rad) of a spring as stiff as the law under the least external torque that is considered."""
 NEARER = 0.25
 """A claim is made only if the ultimate bound is below this share of the largest rotation in the set."""
-LEANS = (0.1, 0.18, 0.3, 0.45)
+LEANS = (0.1, 0.18, 0.33, 0.45)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment); the law's
 own V, if it is a form of q, takes the place of the first two terms."""
 RISES = "V does not decrease on the set from which motions start"

@@ -15,7 +15,7 @@ from starhold.kernel.held import Held
 from starhold.kernel.loops import MOMENTA
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly, minus
-from starhold.kernel.regions import RATE, STATE, TURN, Tube, felt
+from starhold.kernel.regions import RATE, STATE, TURN, Tube, felt, stretch
 from starhold.kernel.theorems.kinetic import (
     ASKED,
     ASKED_PACE,
@@ -34,8 +34,8 @@ Array = NDArray[np.float64]
 
 PACES = np.geomspace(3e-3, 1.0, 60)
 """The paces that are tried, in units of one period."""
-WIDER, ROUNDS = 1.03, 12
-"""The ratio of bounds that are tried, and how many are."""
+WIDER, ROUNDS = 1.012, 8
+"""The ratio of bounds that are tried at first, and how many are."""
 ROOM, FREE, TURNS, STATES, NEARBY, COARSE = 1.005, 0.8, 50, 6000, 1, 6
 """How much more of a limit the law may ask for than it does at first, up to which share of its limits nothing needs to bound
 what it asks for, how many turns and how many states of a set are examined, and at how many lower paces a share has to do."""
@@ -66,9 +66,9 @@ def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
     # Slower states are inside: both are of second degree in the rate.
     parts = [of_rate(p, states) for p in (G, changed)]
     needed = np.array([most_within(*(g + rate / pace for g, rate in zip(*parts, strict=True))) for pace in paces])
-    begun, whole = float(np.linalg.norm(floats(motion.loop.given), 2)) * rate**2, float(parts[0][2].max())
+    begun, whole = float(stretch(motion.loop.given)) * rate**2, float(parts[0][2].max())
     bound, scales = WIDER * max(float(needed.min()), begun), {name: float(region.sizes[name]) for name in STATE}
-    before = 0.0, 0.0
+    before, wider = (0.0, 0.0), WIDER
     for _ in range(ROUNDS):
         if bound >= whole:
             break
@@ -81,7 +81,7 @@ def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
             clear = definiteness(slowing(motion, tube, motion.kinetic, Fraction(pace), Fraction(level)), scales)
             if clear is not None and clear >= CLEAR:
                 return {KINETIC: bound, PACE: pace}
-            bound *= WIDER
+            bound, wider = bound * wider, wider * wider
             continue
         # Where the bound would be the least of itself, along a line.
         grows = (least - before[1]) / (bound - before[0]) if any(before) else 0.0

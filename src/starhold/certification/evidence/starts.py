@@ -46,7 +46,7 @@ def begins(loop: Loop, motion: Held, numbers: Mapping[str, Any], scales: Mapping
             if not isinstance(o, Squares):
                 evidence(name, wanted, scales)
                 continue
-            if ASKED in numbers and name.startswith(("motor", "torque")) and len(o.z) > MANY:
+            if ASKED in numbers and name.startswith(("motor", "torque")) and (len(o.z) > MANY or name.count(" ") == 1):
                 # These take long, and states of the set have told what may be asked for.
                 continue
             chance, least = likely(o, scales, tried), DEFINITE
