@@ -12,12 +12,12 @@ from starhold.certification.assumptions import ASSUMPTIONS
 from starhold.certification.certificate import ORBIT, write
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.station import certify_station
-from starhold.certification.unmodelled import Pushes, envelope_of, named, pushes
+from starhold.certification.unmodelled import DETUMBLING, Pushes, envelope_of, named, pushes
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
 from starhold.laws import modal, wheel
 from starhold.parts.catalogue import PACKAGES, fit, parts
-from starhold.parts.contract import NoParams, Push
+from starhold.parts.contract import Noise, NoParams, Push
 from starhold.parts.part import Fitted, Part
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, parse
@@ -29,7 +29,7 @@ from tests.making import built, on_wheels
 from tests.parts.files import ACTUATOR, JETS, part
 from tests.tiers import leading
 
-NO, PUSH = (lambda *_: None), (lambda *_: Push(1e-6))
+NO, PUSH, SHAKEN = (lambda *_: None), (lambda *_: Push(1e-6)), (lambda *_: Noise(torque=1e-6))
 LAWS = ("pd-0", "sliding-0", "wheel-0", "lyapunov-0", "lqr-I", "lqr-II", "lqr-III", "matrix-pd-inertial", "modal")
 TAKEN = {"two-body", "gravity-gradient", "linear-gravity", "three-body-gravity", "wheels", "history"}
 """The parts that the theorems in docs/certificates.md take in, beside targets that say their motion."""
@@ -174,6 +174,24 @@ def test_a_part_that_tells_half_of_what_it_does_is_left_out(own, enters):
     claim = certified("pd-0", disturbance=1e-4).claim("pointing")
     (told,) = named([claim], textbook()["pd-0"].with_parts(own), 1.0)
     assert (f"without:{own.part.role} of-ones-own" in told.assumptions) != enters
+
+
+@pytest.mark.parametrize(
+    ("own", "enters", "detumbles"),
+    [
+        (half_told("environment", torque=NO, noise=SHAKEN), True, False),
+        (half_told("environment", torque=NO, noise=SHAKEN, bound=PUSH), True, False),
+        (half_told("environment", torque=NO, noise=SHAKEN, bound=lambda *_: Push(float("inf"))), False, False),
+        (half_told("environment", torque=NO, noise=SHAKEN, acceleration=NO), False, False),
+        (half_told("environment", torque=NO, noise=lambda *_: Noise(), bound=PUSH), True, True),
+    ],
+)
+def test_noise_does_not_stand_for_what_else_an_environment_does(own, enters, detumbles):
+    """A torque without a bound beside noise, a force that moves the orbit, and noise in a claim that has none."""
+    claim = certified("pd-0", disturbance=1e-4).claim("pointing")
+    most = replace(claim, numbers={**claim.numbers, "share": 0.9973})
+    told = named([most, replace(claim, kind=DETUMBLING)], textbook()["pd-0"].with_parts(own), 1.0)
+    assert ["without:environment of-ones-own" not in one.assumptions for one in told] == [enters, detumbles]
 
 
 @pytest.mark.parametrize(

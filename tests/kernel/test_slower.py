@@ -16,8 +16,8 @@ from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.blends import renumbered
 from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.evidence.shapes import shares
-from starhold.certification.evidence.slow import at_first
-from starhold.certification.evidence.squares import squares
+from starhold.certification.evidence.slow import at_first, bound_of_rate
+from starhold.certification.evidence.squares import CLEAR, definiteness, squares
 from starhold.certification.evidence.starts import begins
 from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import make_subject
@@ -25,7 +25,7 @@ from starhold.kernel.norms import norms, total_of
 from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import Poly, cross, dot, variables
 from starhold.kernel.regions import STATE
-from starhold.kernel.theorems.kinetic import ASKED, CUBIC, PACE, QUARTIC, changing, twice_energy
+from starhold.kernel.theorems.kinetic import ASKED, CUBIC, PACE, QUARTIC, changing, slowing, twice_energy
 from starhold.kernel.theorems.pointing import descends
 from starhold.scenario.building import build
 from starhold.studies.bodies.rigid_body import wanted_of
@@ -82,6 +82,22 @@ def test_flights_with_momentum_come_near_to_the_bounds_and_not_beyond():
     assert not found
     assert (used <= 1.0).all()
     assert (used > 0.8).all()
+
+
+def test_a_bound_of_the_rate_is_nearly_the_least_that_can_be_shown():
+    loop = Loop(make_subject(built("cubesat-nadir", "wheel")))
+    pushed = Pushed(loop, loop.known.against(loop.known.envelope(True)), True)
+    shape, angle, rate = pushed.usual[1], math.radians(90.0), math.radians(1.0)
+    motion, level = pushed.sampled(shape).motion, Fraction(pushed.chain(shape, angle, rate).level)
+    found, scales = bound_of_rate(motion, float(level), rate), pushed.chain(shape, angle, rate).scales
+
+    def clear(times, faster):
+        motion.kinetic = Fraction(found["kinetic"]) * Fraction(times)
+        tube, pace = motion.tube(motion.region(level)), Fraction(found[PACE] * faster)
+        return (definiteness(slowing(motion, tube, motion.kinetic, pace, level), scales) or -1.0) >= CLEAR
+
+    assert clear(1, 1.0)
+    assert not any(clear(0.9, faster) for faster in (0.8, 0.9, 1.0, 1.1, 1.25))
 
 
 def test_flights_contradict_a_smaller_bound(claim):

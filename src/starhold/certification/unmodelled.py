@@ -218,7 +218,9 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
         envelope = envelope_of(loop, momentum, bool(noisy))
         moved = appendages(loop) if claim.kind == "appendages" else ()
-        there = (*noisy, *moved, *(_moving(loop) if claim.numbers.get("late_torque") else ()))
+        # Noise may not be all that an environment does.
+        shaking = [f for f in noisy if f.part.role != "environment" or _says(loop, f, envelope, noisy=True)]
+        there = (*shaking, *moved, *(_moving(loop) if claim.numbers.get("late_torque") else ()))
         grown = "told_growth" in claim.numbers
         # Parts whose errors grow are left out unless the claim includes the growth, and noisy ones unless it includes noise.
         left = [f for parts, one in misread if one.grows and not grown for f in parts]
@@ -270,8 +272,9 @@ def _is_modelled(part: Part) -> bool:
     return part.name in READ.get(part.role, ()) and part.file is None
 
 
-def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
-    """Whether everything that a part does to a loop, besides what the law measures, has a bound."""
+def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, noisy: bool = False) -> bool:
+    """Whether everything that a part does to a loop, besides what the law measures, has a bound. noisy: the claim includes
+    its noise, which is all that it does if it declares no bound."""
     part, banded = fitted.part, fitted in movers(loop) and bool(band_of(loop).share)
     if moves(fitted.params) or (_always_moves(fitted) and not banded):
         # No claim follows an orbit that such a force changes.
@@ -284,7 +287,7 @@ def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
         # use that a law makes of its momentum.
         sized = torque and part.hook("inertia") is None
         return sized and (not part.flag("ACTS") or (error and not tells_momentum(loop, fitted)))
-    return _is_idle(loop, fitted, envelope) or torque or error
+    return _is_idle(loop, fitted, envelope) or torque or error or (noisy and part.hook("bound") is None)
 
 
 def _gives(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, claim: Claim) -> bool:
@@ -313,7 +316,7 @@ def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool
     if part.role == "sensor" and "magnetic_field" in shown(fitted):
         return bounded(fitted, period) == NO_ERRORS and not is_random(noise_of(fitted, period))
     if part.role == "environment":
-        still = not moves(fitted.params) and not _always_moves(fitted)
+        still = not (moves(fitted.params) or _always_moves(fitted) or noise_of(fitted, period).torque)
         return _is_modelled(part) or (_pushes(fitted, envelope)[0] is not None and still)
     return part.role in ("sensor", "estimator", "target") or part.name in ("magnetorquers", "inactive-wheels")
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,8 @@ WIDER, ROUNDS = 1.012, 8
 """The ratio of bounds that are tried at first, and how many are."""
 ROOM, FREE, TURNS, STATES, NEARBY, COARSE = 1.005, 0.8, 50, 6000, 1, 6
 """How much more of a limit the law may ask for than it does at first, up to which share of its limits nothing needs to bound
-what it asks for, how many turns and how many states of a set are examined, and at how many lower paces a share has to do."""
+what it asks for, how many turns and how many states of a set are examined, at how many lower paces a share has to do, and
+one in how many paces is examined at first."""
 
 
 def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[str, Any]) -> dict[str, float]:
@@ -108,14 +110,12 @@ def bound_of_torque(
     speeds, paces = shares_of(motion, rows, rates, states), PACES / float(motion.h)
     rest = float((np.abs(rows) @ floats([more])[0] + each * float(pushed)).max())
 
+    @cache
     def needed(place: int) -> float:
-        if place not in known:
-            pace = paces[place]
-            known[place] = largest_of(*(p + rate / pace for p, rate in zip(torque, speeds, strict=True))) + rest / pace
-        return known[place]
+        pace = paces[place]
+        return largest_of(*(p + rate / pace for p, rate in zip(torque, speeds, strict=True))) + rest / pace
 
-    known, few = dict[int, float](), range(0, len(paces), COARSE)
-    best = min(few, key=needed)
+    best = min(range(0, len(paces), COARSE), key=needed)
     # Just below the best pace much more is needed, and everywhere a sum of squares needs more than these states do.
     share, place = min(
         (max(map(needed, range(max(k - NEARBY, 0), k + 1))), k)
