@@ -105,4 +105,5 @@ class Driven:
         """How errors of what the law is told grow with the motion, if they do."""
         n = self.numbers
         rows = [[n.get(f"error.{told}.per.{of}", 0.0) for of in ("rate", "acceleration")] for told in ("attitude", "rate")]
-        return (rows, max(1, int(n.get("error.ago", 0.0) / n["period"])), n["period"]) if np.any(rows) else None
+        count, kept = max(1, int(n.get("error.ago", 0.0) / n["period"])), n.get("error.kept", 0.0)
+        return (rows, count, n["period"], kept) if np.any(rows) else None

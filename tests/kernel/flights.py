@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+WINDOWS = 12
+"""How many windows of samples errors remember that grow with the motion."""
 
 
 def cross(a, b):
@@ -52,7 +54,7 @@ class Surroundings(NamedTuple):
     wheels (None: there are none), of errors of the attitude and the rate that it is told, and of how fast the torque changes
     that it is told, with what is more for each rad that the body turns; the deviation of a random torque and the most that
     it is; and how much more attitude and rate are off for each unit of the body's rate and acceleration in so many of the
-    last samples (rows, samples, period)."""
+    last samples, of which a share is left after as many more (rows, samples, period, share)."""
 
     told: list
     rate: float
@@ -101,7 +103,8 @@ class Around:
         self.swing = bounds.acceleration / max(bounds.rate, 1e-300)
         self.told = np.array(bounds.told)[:, None]
         self.kept = 0.7 * (bounds.momentum or 0.0) * along(rng.normal(size=(3, lanes)))
-        self.load, self.sudden, self.past = None, not np.isfinite(bounds.change[0]), []
+        self.load, self.sudden, self.past, self.windows = None, not np.isfinite(bounds.change[0]), [], []
+        self.samples = 0
 
     def target(self, q, t):
         if not self.bounds.rate and not self.bounds.acceleration:
@@ -111,16 +114,25 @@ class Around:
         return seen(q, rate * self.axis), seen(q, slope * self.axis)
 
     def misled(self, q, w, t):
-        """How far attitude and rate are off that the law is told: as much as they may be after the last samples."""
+        """How far attitude and rate are off that the law is told: as much as they may be after the last samples, and after
+        those before, of which they forget a share in as many samples."""
         turned, rated = self.bounds.turned, self.bounds.rated
         if self.bounds.moving is None:
             return turned, rated
-        rows, count, h = self.bounds.moving
+        rows, count, h, kept = self.bounds.moving
         inertial = w + self.target(q, t)[0]
         before = self.past[-1][0] if self.past else inertial
         self.past = [*self.past, (inertial, np.linalg.norm(inertial - before, axis=0) / h)][-count - 1 :]
         fast = np.max([np.linalg.norm(one, axis=0) for one, _ in self.past], axis=0)
-        more = np.array(rows) @ np.stack([fast, np.max([one for _, one in self.past[-count:]], axis=0)])
+        last = most = np.stack([fast, np.max([one for _, one in self.past[-count:]], axis=0)])
+        share, told = 1.0, 0.0
+        for one in [most, *self.windows]:
+            most = np.maximum(most, one)
+            told, share = told + share * (1.0 - kept) * most, share * kept
+        self.samples += 1
+        if kept and self.samples % count == 0:
+            self.windows = [last, *self.windows][:WINDOWS]
+        more = np.array(rows) @ (told + share * most)
         return turned + more[0], rated + more[1]
 
     def command(self, law, q, w, t, unit, misread=None):
