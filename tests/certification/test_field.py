@@ -50,6 +50,14 @@ def test_positions_and_field_are_those_of_flights(orbit):
     assert 0.6 * change < flown.max() < change
 
 
+def test_a_law_that_no_sensor_tells_the_field_has_no_claim():
+    given = exact(**{"simulation.duration": "30 min"})
+    loop = build(given, given.pick("b-dot"))
+    blind = loop.without("magnetometer")
+    claims = [certify(one).claim("detumbling") for one in (loop, blind)]
+    assert [claim is not None and claim.outcome == "proved" for claim in claims] == [True, False]
+
+
 FLOWN = [("b-dot", ["6 deg/s", "-5 deg/s", "6.2 deg/s"]), ("quick", ["1 deg/s", "1 deg/s", "-0.5 deg/s"])]
 
 

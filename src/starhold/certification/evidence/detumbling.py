@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.operations import UnreadableError
+from starhold.certification.directions import shown
 from starhold.certification.evidence.finding import NotFoundError, complete, read
 from starhold.certification.evidence.recorded import RecordedLoop
 from starhold.certification.evidence.squares import rounded
@@ -66,6 +67,8 @@ def bounds_of(subject: Subject, rate: float = 0.0) -> tuple[list[str], dict[str,
     idle = [f for f in loop.used("effector") if f.part.name == IDLE]
     if len(rods) != 1 or len(rods) + len(idle) < len(loop.used("effector")):
         raise NotFoundError("other effectors than magnetorquers act")
+    if not any("magnetic_field" in shown(fitted) for fitted in loop.used("sensor")):
+        raise NotFoundError("no sensor measures the magnetic field")
     params = rods[0].params
     if params.limited != LIMITED.choices.index("together") or any(params.mounting_error):
         raise NotFoundError("the dipoles of the magnetorquers are not reduced together, or not as commanded")

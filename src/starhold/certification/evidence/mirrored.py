@@ -45,11 +45,11 @@ def shown_once(o: Squares, find: Callable[[], Any]) -> Any:
 
 def different(sums: Sequence[Squares]) -> list[Squares]:
     """Return those of the sums that are no images of others before them."""
-    found = dict[About, Squares]()
+    kept = dict[About, Squares]()
     for o in sums:
-        if all(about not in found for _, about in images(o)):
-            found.setdefault(about_of(o), o)
-    return [*found.values()]
+        if all(about not in kept for _, about in images(o)):
+            kept.setdefault(about_of(o), o)
+    return [*kept.values()]
 
 
 def images(o: Squares) -> Iterator[tuple[Image, About]]:
