@@ -17,7 +17,7 @@ from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import MOMENTA, AttitudeLoop
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.regions import ANGLE, AT_REST, SPEED, STATE
-from starhold.kernel.theorems.kinetic import QUARTIC, alone, changing, kinds_of, twice_energy
+from starhold.kernel.theorems.kinetic import QUARTIC, changing, kinds_of, twice_energy
 from starhold.kernel.theorems.pointing import points
 from tests.kernel.flights import Around, Surroundings, along, cross
 from tests.kernel.oracle import Oracle, run
@@ -82,7 +82,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
             dict(zip(("q0", *STATE[3:], *STATE[:3], *MOMENTA), np.concatenate(one), strict=True))
             for one in ((q, w, momentum), (later, rate, around.kept))
         ]
-        command = alone(held)
+        command = held.alone
         for parts, kinds in (([twice_energy(held)], QUARTIC), (command, kinds_of(command))):
             means, beside, pushed = changing(held, tube, parts, kinds)
             before, after = (np.array([valued(p, one) for p in parts]) for one in states)
@@ -267,7 +267,7 @@ def test_momentum_that_turns_with_the_target_changes_what_a_law_asks_for():
     """Where body, momentum and target turn as fits worst, flights show what that adds, and the bound of a change has it."""
     held, oracle = carried(**{"momentum": 5e-3, "target.rate": 0.02})
     n, h, rng = oracle.numbers, float(held.h), np.random.default_rng(9)
-    level, command = (held.s + held.G[3][3]) / 2**12, alone(held)
+    level, command = (held.s + held.G[3][3]) / 2**12, held.alone
     tube = held.tube(held.region(level))
     means, beside, pushed = changing(held, tube, command, kinds_of(command))
     around = Around(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import NamedTuple
 
 from .loops import AXES
@@ -17,6 +18,7 @@ from .regions import (
     AMISS,
     ANGLE,
     AT_REST,
+    COMMANDED,
     PULL,
     RATE,
     SPEED,
@@ -111,6 +113,7 @@ class Follower(Reader):
 
     near: Near
     h: Fraction
+    N: Rows
     light: Fraction
     widths: list[Fraction]
     pull: list[Poly]
@@ -179,6 +182,17 @@ class Follower(Reader):
         """Return bounds of the torque's error where V + weight a^2 is at most c."""
         return {FIRST: root(up(c / self.late.weight)), REST: self.late.rest} if self.late else {}
 
+    @cached_property
+    def alone(self) -> list[Poly]:
+        """Return what the law asks for because of the state and of the wheels' momentum, with nothing else from outside."""
+        absent = {name: 0 for name in self.others if name[0] != "h"}
+        return [p.at(absent) for p in self.loop.u]
+
+    @cached_property
+    def besides(self) -> list[Poly]:
+        """Return the acceleration that is commanded besides that."""
+        return minus(self.pull, apply(self.N, self.alone))
+
     def command_sizes(self, region: Region) -> tuple[Sizes, list[Fraction], Fraction]:
         """Return bounds of the acceleration that is commanded, of that at the sample, and of the torque due to external
         quantities, if what is told is true. They do not depend on errors, which are bounded again and again in a region."""
@@ -192,6 +206,9 @@ class Follower(Reader):
             odd = [most(p, near) for p in self.odd]
             asks = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
             pulled = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
+            for k, name in enumerate(COMMANDED if COMMANDED[0] in sizes else ()):
+                u, bent = sizes[name] + most(self.besides[k], sizes), most(self.bend[k], sizes)
+                asks[f"u{k + 1}"], pulled[k] = min(asks[f"u{k + 1}"], u), min(pulled[k], u + bent)
             rigid = sum((felt(parts, x, sizes) * self.size(x) for x, parts in self.rigid.items()), ZERO)
             known = asks, pulled, rigid
             self.last_sizes = region.X, near, known

@@ -20,6 +20,9 @@ RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
 SPEED, ANGLE, PULL, LOAD = "|w", "|q", "|u", "|j"
 """The names of the sizes of |w| and |q|, of the linear acceleration where it is known, and in a tube of the torque due to an
 inertia near the given one."""
+COMMANDED = "|u1", "|u2", "|u3"
+"""The names of the sizes of the acceleration about each axis that is commanded because of state and momentum, where a claim
+bounds it."""
 AMISS = "|turn", "|rate"
 """The names, in a tube, of the additional errors of measured attitude and rate due to the motion."""
 TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]

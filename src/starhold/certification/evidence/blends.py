@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import Any
 
 from starhold.certification.evidence.squares import mixed
-from starhold.kernel.follower import Late
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Rows, demand
@@ -62,13 +61,18 @@ class Blended(Held):
             super().__init__(loop)
             known.motion.update(vars(self))
         self.known = known.parts
-        self.regions = dict[tuple[Fraction, Late | None, Fraction | None], Region]()
-        self.tubes = dict[tuple[int, Late | None, Fraction | None], tuple[Region, Tube]]()
-        self.falls = dict[tuple[int, Late | None, Fraction | None], tuple[Tube, Any]]()
+        self.regions = dict[tuple[Any, ...], Region]()
+        self.tubes = dict[tuple[Any, ...], tuple[Region, Tube]]()
+        self.falls = dict[tuple[Any, ...], tuple[Tube, Any]]()
+
+    @property
+    def bounds(self) -> tuple[Any, ...]:
+        """Return what sets depend on besides a level, and the search for a claim changes."""
+        return self.late, self.kinetic, *self.asked.items()
 
     def region(self, c: Fraction) -> Region:
         """Return a region that contains {V <= c}."""
-        key = c, self.late, self.kinetic
+        key = c, *self.bounds
         if key not in self.regions:
             self.regions[key] = super().region(c)
         return self.regions[key]
@@ -77,7 +81,7 @@ class Blended(Held):
         """Return a set that motions from a region do not leave for a period."""
         if amiss is not None:
             return super().tube(region, amiss)
-        key = id(region), self.late, self.kinetic
+        key = id(region), *self.bounds
         if key not in self.tubes:
             # With the region, so that no other one gets its identity.
             self.tubes[key] = region, super().tube(region)
@@ -85,7 +89,7 @@ class Blended(Held):
 
     def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction, Fraction]:
         """Return how V changes in a period."""
-        key = id(tube), self.late, self.kinetic
+        key = id(tube), *self.bounds
         if key not in self.falls:
             self.falls[key] = tube, super().fall(tube)
         return self.falls[key][1]

@@ -36,7 +36,7 @@ from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, demand
 from starhold.kernel.programs import Program
 from starhold.kernel.reading import Told
-from starhold.kernel.theorems.kinetic import KINETIC
+from starhold.kernel.theorems.kinetic import KINETIC, commanded
 from starhold.kernel.theorems.noise import SHARE
 from starhold.parts.craft import tensor
 
@@ -316,7 +316,8 @@ class Pushed:
     def chain(self, shape: Shape, angle: float, rate: float, slow: Mapping[str, float] = MappingProxyType({})) -> Chain:
         """Return a chain from the least level set of V that holds a start. slow: the numbers of a bound of the rate."""
         _, V, motion, tried = self.sampled(shape)
-        motion.kinetic = Fraction(slow[KINETIC]) if slow else None
+        bounds = {name: Fraction(x) for name, x in slow.items()}
+        motion.kinetic, motion.asked = bounds.get(KINETIC), commanded(motion, bounds)
         motion.late = begun_late(motion, sin(min(angle, pi) / 2.0), rate)
         level = largest_in(motion, angle, rate)
         level += float(motion.late.weight * motion.late.begun**2) if motion.late else 0.0

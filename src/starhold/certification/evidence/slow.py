@@ -16,15 +16,15 @@ from starhold.kernel.held import Held
 from starhold.kernel.loops import MOMENTA
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly, minus
-from starhold.kernel.regions import RATE, STATE, TURN, Tube, felt, stretch
+from starhold.kernel.regions import RATE, STATE, TURN, felt, stretch
 from starhold.kernel.theorems.kinetic import (
     ASKED,
     ASKED_PACE,
     KINETIC,
     PACE,
     QUARTIC,
-    alone,
     changing,
+    commanded,
     kinds_of,
     mean_rate,
     slowing,
@@ -48,11 +48,11 @@ def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[s
     the torque if that exceeds its limits nonetheless; none where one is not found."""
     try:
         slow = bound_of_rate(motion, level, rate)
-        rows = shares(motion, {name: x for name, x in limits.items() if name != "limit.norm"})
+        limits = {name: x for name, x in limits.items() if name != "limit.norm"}
+        rows = shares(motion, limits)
         if slow and len(rows) and motion.plan is None and motion.loop.added is None:
-            tube = motion.tube(motion.region(Fraction(level)))
-            torque = bound_of_torque(motion, tube, level, angle, rate, rows)
-            return {} if torque is None else slow | torque
+            torque = bound_of_torque(motion, level, angle, rate, rows, limits)
+            return {} if torque is None else slow | torque | (limits if torque else {})
     except RefusedError:
         # The set is too large.
         return {}
@@ -61,7 +61,7 @@ def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[s
 
 def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
     """Return the numbers of a bound of w.Jw that seems to hold, as small as possible; none where there is none."""
-    motion.kinetic = None
+    motion.kinetic, motion.asked = None, {}
     G, paces, region = twice_energy(motion), PACES / float(motion.h), motion.region(Fraction(level))
     states = on_the_border(motion, level)
     changed = mean_rate(motion, G, QUARTIC)[0]
@@ -93,19 +93,23 @@ def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
 
 
 def bound_of_torque(
-    motion: Held, tube: Tube, level: float, angle: float, rate: float, rows: Array
+    motion: Held, level: float, angle: float, rate: float, rows: Array, limits: Mapping[str, float]
 ) -> dict[str, float] | None:
     """Return the numbers of a bound of what the law asks for because of state and momentum that seems to hold; none where it
     asks for less than its limits anyway, clearly so or without a bound, and None where it does not. rows: what takes the
     torque to shares of its limits."""
-    command, each, sizes = alone(motion), np.linalg.norm(rows, axis=1), tube.region.sizes
+    region = motion.region(Fraction(level))
+    command, each, sizes = motion.alone, np.linalg.norm(rows, axis=1), region.sizes
     beside = minus(motion.loop.u, command)
     besides = [felt(beside, letter, sizes) * motion.size(letter) for letter in "era"]
-    most = 1.0 - float(motion.misread(tube.region)[0] + sum(besides, Fraction(0))) * float(each.max())
+    most = 1.0 - float(motion.misread(region)[0] + sum(besides, Fraction(0))) * float(each.max())
     states = on_the_border(motion, level)
     torque = shares_of(motion, rows, command, states)
     if (largest := largest_of(*torque)) < FREE * most:
         return {}
+    # On a set where it keeps to its limits its torque changes less than on the whole one.
+    motion.asked = commanded(motion, {ASKED: Fraction(1)} | {name: Fraction(x) for name, x in limits.items()})
+    tube = motion.tube(motion.region(Fraction(level)))
     rates, more, pushed = changing(motion, tube, command, kinds_of(command))
     speeds, paces = shares_of(motion, rows, rates, states), PACES / float(motion.h)
     rest = float((np.abs(rows) @ floats([more])[0] + each * float(pushed)).max())
@@ -160,7 +164,7 @@ def at_first(motion: Held, rows: Array, angle: float, rate: float) -> float:
     """Return the largest share of a limit that the law asks for because of momentum and a state turned by up to an angle
     (rad) at up to a rate (rad/s)."""
     turned, names = np.linspace(0.0, min(angle, np.pi), TURNS), ("q0", *STATE[TURN], *STATE[RATE])
-    command, most = alone(motion), 0.0
+    command, most = motion.alone, 0.0
     for row, along in zip(rows, rows @ floats(motion.near.torque), strict=True):
         q, w = (x / (float(np.linalg.norm(x)) or 1.0) for x in (along[TURN], along[RATE]))
         states = [np.cos(turned / 2.0), *np.outer(q, np.sin(turned / 2.0)), *np.outer(rate * w, np.ones(TURNS))]

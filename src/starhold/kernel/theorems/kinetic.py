@@ -3,14 +3,17 @@ before they reach them. Proof: docs/kernel-flying.md."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
+from typing import Any
 
 from ..held import Held
+from ..loops import AXES
 from ..norms import Norms, norms, total_of
-from ..numbers import demand, norm
+from ..numbers import demand, norm, reach
 from ..polynomials import Poly, apply, derivatives, dot, fastest
-from ..regions import ANGLE, SPEED, Tube, felt, stretch
+from ..reading import Numbers
+from ..regions import ANGLE, COMMANDED, SPEED, Sizes, Tube, felt, named, stretch
 from ..rules import Exceeds, Part, Squares
 from .attitude import within_turn
 from .limits import Asking, basis, heeds_momentum
@@ -52,7 +55,7 @@ def asking(motion: Held, tube: Tube) -> Asking | None:
     numbers, loop, still = motion.loop.claim.numbers, motion.loop, motion.loop.still
     if (share := numbers.get(ASKED)) is None:
         return None
-    pace, command = numbers[ASKED_PACE], alone(motion)
+    pace, command = numbers[ASKED_PACE], motion.alone
     demand(0 < share < 1 and 0 < motion.h * pace <= 1, "a limit is not properly approached")
     demand(motion.plan is None and loop.added is None and "rate" not in numbers, "a limit is not approached like this")
     begun = within_turn(loop, numbers["start.angle" if "start.rate" in numbers else "angle"])
@@ -62,10 +65,18 @@ def asking(motion: Held, tube: Tube) -> Asking | None:
     return Asking(share, pace, command, *changing(motion, tube, command, kinds_of(command)), begun, still)
 
 
-def alone(motion: Held) -> list[Poly]:
-    """Return what the law asks for because of the state and of the wheels' momentum, without anything else from outside."""
-    absent = {name: 0 for name in motion.others if name[0] != "h"}
-    return [p.at(absent) for p in motion.loop.u]
+def commanded(motion: Held, numbers: Mapping[str, Any] | Numbers) -> Sizes:
+    """Return bounds of the acceleration that the law asks for because of state and momentum, where a claim with these
+    numbers shows that it keeps to a share of its limits; otherwise none."""
+    subject, share, limit = motion.loop.claim.subject, numbers.get(ASKED), numbers.get("limit")
+    torques = [[limit] * len(AXES)] if limit is not None else []
+    count = next(k for k in range(1000) if not motion.loop.wheels or f"wheel.{k}.axis.0" not in subject)
+    if count and all(f"motors.{k}" in numbers for k in range(count)):
+        axes = [[subject[f"wheel.{k}.axis.{i}"] for k in range(count)] for i in AXES]
+        torques.append(reach(axes, [numbers[f"motors.{k}"] for k in range(count)]))
+    if share is None or not torques:
+        return {}
+    return named(COMMANDED, reach(motion.N, [share * min(x) for x in zip(*torques, strict=True)]))
 
 
 def kinds_of(command: Sequence[Poly]) -> tuple[str, ...]:
