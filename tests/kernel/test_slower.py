@@ -25,7 +25,7 @@ from starhold.kernel.norms import norms, total_of
 from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import Poly, cross, dot, variables
 from starhold.kernel.regions import STATE
-from starhold.kernel.theorems.kinetic import ASKED, CUBIC, PACE, QUARTIC, changing, slowing, twice_energy
+from starhold.kernel.theorems.kinetic import ASKED, CUBIC, PACE, QUARTIC, changing, commanded, slowing, twice_energy
 from starhold.kernel.theorems.pointing import descends
 from starhold.scenario.building import build
 from starhold.studies.bodies.rigid_body import wanted_of
@@ -98,6 +98,28 @@ def test_a_bound_of_the_rate_is_nearly_the_least_that_can_be_shown():
 
     assert clear(1, 1.0)
     assert not any(clear(0.9, faster) for faster in (0.8, 0.9, 1.0, 1.1, 1.25))
+
+
+def test_a_law_that_keeps_to_its_limits_accelerates_the_body_no_more_than_sets_know():
+    """States of a set that the claim's bounds cut off, with momentum of any direction, by the law's own program."""
+    loop = Loop(make_subject(built("wheels-orbital", "wheel")))
+    pushed = Pushed(loop, loop.known.against(loop.known.envelope(False)))
+    assert pushed.find(math.radians(70.0), 0.004, loop.limits), loop.failed
+    [proof] = loop.claims
+    attack = Attack({"programs": dict(loop.by_digest)}, proof, 3, 20000)
+    n, r = attack.numbers, attack.rng
+    motion = pushed.sampled(next(iter(pushed.known))).motion
+    most = [float(x) for x in commanded(motion, {name: Fraction(x) for name, x in proof["numbers"].items()}).values()]
+    half = r.uniform(0.0, math.pi / 2, attack.lanes)
+    q = np.concatenate([np.cos(half)[None], np.sin(half) * along(r.normal(size=(3, attack.lanes)))])
+    w, none = math.sqrt(n["kinetic"]) * r.normal(size=q[1:].shape), np.zeros(q[1:].shape)
+    H = n["momentum"] * along(r.normal(size=w.shape))
+    u = attack.fleet().law(q, w, none, none, none, H)
+    # As far as the law's share of its limits lets it.
+    u = u * n["asked"] / attack.loads(u)
+    faster = np.abs(np.linalg.solve(attack.J, u)).max(axis=1)
+    assert (faster <= most).all()
+    assert (faster > 0.9 * np.array(most)).all()
 
 
 def test_flights_contradict_a_smaller_bound(claim):
