@@ -81,7 +81,7 @@ class Held(Follower):
         demand(self.held_back < 1, "errors are not forgotten")
         self.off = loop.off if "tolerance" in numbers else ZERO
         self.kinetic: Fraction | None = None  # A bound of w.Jw, where a theorem shows one,
-        self.asked = Sizes()  # and bounds of the acceleration that is commanded.
+        self.commands = Sizes()  # and bounds of the acceleration that is commanded.
         self.led, self.hurried = (numbers.get(f"error.target.{name}") or Fraction(0) for name in ("rate", "acceleration"))
         demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
         given = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
@@ -212,7 +212,7 @@ class Held(Follower):
             sizes |= {k: min(sizes[k], root(self.kinetic * self.N[i][i])) for i, k in enumerate(STATE[RATE])}
             sizes[SPEED] = min(sizes[SPEED], root(self.kinetic * self.light))
         sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in (*STATE[TURN], ANGLE)} | self.of_level(c)
-        return Region(X, sizes | self.others | self.asked, least)
+        return Region(X, sizes | self.others | self.commands, least)
 
     def planned(self, sizes: Sizes) -> Fraction:
         """Return a bound of the torque's distance from the moves of a plan, if there is one."""

@@ -68,7 +68,7 @@ class Blended(Held):
     @property
     def bounds(self) -> tuple[Any, ...]:
         """Return what sets depend on besides a level, and the search for a claim changes."""
-        return self.late, self.kinetic, *self.asked.items()
+        return self.late, self.kinetic, *self.commands.items()
 
     def region(self, c: Fraction) -> Region:
         """Return a region that contains {V <= c}."""

@@ -153,7 +153,7 @@ class Chain:
 
     def falls(self, c: Fraction) -> Falls:
         """Return how V decreases from a level."""
-        key = c, self.motion.late, self.motion.kinetic, *self.motion.asked.items()
+        key = c, self.motion.late, self.motion.kinetic, *self.motion.commands.items()
         if key not in self.tried:
             self.tried[key] = self.sought(c)
         return self.tried[key]

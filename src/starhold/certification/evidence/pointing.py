@@ -317,7 +317,7 @@ class Pushed:
         """Return a chain from the least level set of V that holds a start. slow: the numbers of a bound of the rate."""
         _, V, motion, tried = self.sampled(shape)
         bounds = {name: Fraction(x) for name, x in slow.items()}
-        motion.kinetic, motion.asked = bounds.get(KINETIC), commanded(motion, bounds)
+        motion.kinetic, motion.commands = bounds.get(KINETIC), commanded(motion, bounds)
         motion.late = begun_late(motion, sin(min(angle, pi) / 2.0), rate)
         level = largest_in(motion, angle, rate)
         level += float(motion.late.weight * motion.late.begun**2) if motion.late else 0.0

@@ -61,7 +61,7 @@ def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[s
 
 def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
     """Return the numbers of a bound of w.Jw that seems to hold, as small as possible; none where there is none."""
-    motion.kinetic, motion.asked = None, {}
+    motion.kinetic, motion.commands = None, {}
     G, paces, region = twice_energy(motion), PACES / float(motion.h), motion.region(Fraction(level))
     states = on_the_border(motion, level)
     changed = mean_rate(motion, G, QUARTIC)[0]
@@ -108,7 +108,7 @@ def bound_of_torque(
     if (largest := largest_of(*torque)) < FREE * most:
         return {}
     # On a set where it keeps to its limits its torque changes less than on the whole one.
-    motion.asked = commanded(motion, {ASKED: Fraction(1)} | {name: Fraction(x) for name, x in limits.items()})
+    motion.commands = commanded(motion, {ASKED: Fraction(1)} | {name: Fraction(x) for name, x in limits.items()})
     tube = motion.tube(motion.region(Fraction(level)))
     rates, more, pushed = changing(motion, tube, command, kinds_of(command))
     speeds, paces = shares_of(motion, rows, rates, states), PACES / float(motion.h)

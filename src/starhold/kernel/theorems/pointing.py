@@ -71,7 +71,7 @@ def points(claim: Claim) -> Proof:
 def descends(loop: AttitudeLoop, motion: Held) -> Proof:
     """The theorem `points` for a loop whose body is the one of the equations."""
     claim, numbers, samples = loop.claim, loop.claim.numbers, 0
-    c, h, motion.kinetic, motion.asked = numbers["level"], motion.h, numbers.get(KINETIC), commanded(motion, numbers)
+    c, h, motion.kinetic, motion.commands = numbers["level"], motion.h, numbers.get(KINETIC), commanded(motion, numbers)
     starts = [numbers.get(name) or Fraction(0) for name in ("angle", "start.angle")]
     demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
     # The late torque's error is in the set from the beginning.
