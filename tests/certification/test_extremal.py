@@ -32,7 +32,7 @@ LONG = [
     (15038, "every", None, (-0.515, 0.553, -0.655), 0.479),
     (15008, "every", 0.00131, (0.112, 0.026, 0.993), 0.75),
     (20004, "every", 0.002648, (-0.988, -0.02, -0.155), 0.649),
-    (20021, "every", None, (-0.91, 0.413, 0.024), 0.779),
+    (20021, "every", None, (-0.91, 0.413, 0.024), 0.772),
 ]
 """The same with a large start, an inertia known to a share, the Sun, an integral, a lost wheel, and random torques."""
 
