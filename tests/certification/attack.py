@@ -140,14 +140,16 @@ class Attack(Oracle):
         fleet.unsettled = np.where(near, 0.0, 1.0)
         fleet.push, fleet.misread, found, reached = push, misread, "", [0.0, 0.0, 0.0]
         begun = SETTLED / self.slow if "share" in n else 0.0
-        for k, q, w in fleet.fly(*begin, periods):
+        for count, (k, q, w) in enumerate(fleet.fly(*begin, periods)):
             settled = (k * h > n["settling"]) | (near & (k * h > begun))
             high = float((self.lyapunov(q, w) - V0).max()) / n["highest"]
             angle, rate = turn(q) / n["end.angle"], np.linalg.norm(w, axis=0) / n["end.rate"]
             shares = [high, *(float(x[settled].max()) if settled.any() else 0.0 for x in (angle, rate))]
             reached = [max(pair) for pair in zip(reached, shares, strict=True)]
-            momentum = fleet.surrounding.kept if "momentum" in n else None
-            self.used[:2] = np.maximum(self.used[:2], np.max(self.kept_bounds(law, q, w, momentum), axis=1))
+            # Between samples nothing is asked for.
+            if count % 2:
+                momentum = fleet.surrounding.kept if "momentum" in n else None
+                self.used[:2] = np.maximum(self.used[:2], np.max(self.kept_bounds(law, q, w, momentum), axis=1))
             shares += [*self.used]
             if max(shares) > 1.0 and not found:
                 of = "V", "angle", "rate", "w.Jw", "what is asked because of state and momentum", "torque"
