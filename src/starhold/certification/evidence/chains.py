@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from starhold.certification.evidence.blends import Blended
 from starhold.certification.evidence.ellipsoids import HEED, MORE, ends, highest_ratio, smallest
 from starhold.certification.evidence.finding import concluded
 from starhold.certification.evidence.lates import of_late
@@ -19,7 +20,6 @@ from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.shapes import Shape
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.matrices import floats
-from starhold.kernel.held import Held
 from starhold.kernel.numbers import RefusedError, plus, times, transpose
 from starhold.kernel.regions import STATE, Tube, balls, factored, least_form
 from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
@@ -64,7 +64,7 @@ class Falls(list[Lower]):
 class Chain:
     """Levels from a set down to where disturbances outweigh the damping, and ellipsoids from there on."""
 
-    motion: Held
+    motion: Blended
     V: str
     level: float
     tried: dict[Any, Falls] = field(default_factory=dict[Any, Falls])
@@ -153,7 +153,7 @@ class Chain:
 
     def falls(self, c: Fraction) -> Falls:
         """Return how V decreases from a level."""
-        key = c, self.motion.late, self.motion.kinetic, *self.motion.commands.items()
+        key = c, *self.motion.bounds
         if key not in self.tried:
             self.tried[key] = self.sought(c)
         return self.tried[key]

@@ -16,8 +16,8 @@ Image: TypeAlias = tuple[str, str]
 """The letters of the variables, and the axes, that change their signs; those of both keep them, as q0 does."""
 
 IMAGES = tuple(product(("", "qwera", "qwerah"), ("", "12", "23", "13")))[1:]
-"""What changes its sign: in mirrors attitude, rate, told torque, and the target's rate and acceleration, and momentum where
-what wheels store is odd; and two of three axes in a half turn about the third."""
+"""Mirrors change the signs of attitude, rate, told torque, and the target's rate and acceleration, and of momentum where
+what wheels store is odd; a half turn about an axis changes those about the two others."""
 MOST = 64
 _SHOWN: dict[About, tuple[Squares, Any]] = {}
 """The latest sums for which there is evidence, by what they are about."""

@@ -102,13 +102,8 @@ def finds(first: Pushed, tried: list[Beginning]) -> bool:
         faster = start[0], min((x for x in (*beyond, rate) if x > start[1]), default=start[1])
         farther = min((x for x in angles if x > start[0]), default=start[0]), start[1]
         larger = [one for one in (faster, farther) if start[0] and one != start]
-        if any(other.may_begin(*one, limits) for one in larger) or not start[0]:
-            both = [other, first]
-        elif first.find(*start, limits):
-            first.explain(start)
-            return True
-        else:
-            both = [first, other]
+        less = not start[0] or any(other.may_begin(*one, limits) for one in larger)
+        both = [other, first] if less else [first, other]
     return any(pushed.find_largest(*one) for pushed in both for one in tried)
 
 

@@ -52,7 +52,7 @@ def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[s
         rows = shares(motion, limits)
         if slow and len(rows) and motion.plan is None and motion.loop.added is None:
             torque = bound_of_torque(motion, level, angle, rate, rows, limits)
-            return {} if torque is None else slow | torque | (limits if torque else {})
+            return {} if torque is None else slow | torque
     except RefusedError:
         # The set is too large.
         return {}
@@ -95,9 +95,9 @@ def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
 def bound_of_torque(
     motion: Held, level: float, angle: float, rate: float, rows: Array, limits: Mapping[str, float]
 ) -> dict[str, float] | None:
-    """Return the numbers of a bound of what the law asks for because of state and momentum that seems to hold; none where it
-    asks for less than its limits anyway, clearly so or without a bound, and None where it does not. rows: what takes the
-    torque to shares of its limits."""
+    """Return the numbers of a bound of what the law asks for because of state and momentum that seems to hold, with the
+    limits of which it is a share; none where it asks for less than its limits anyway, clearly so or without a bound, and
+    None where it does not. rows: what takes the torque to shares of its limits."""
     region = motion.region(Fraction(level))
     command, each, sizes = motion.alone, np.linalg.norm(rows, axis=1), region.sizes
     beside = minus(motion.loop.u, command)
@@ -128,7 +128,7 @@ def bound_of_torque(
     pace = float(paces[place])
     share = max(share, at_first(motion, rows, angle, rate) * ROOM)
     # What the rest of the torque leaves, but for some room that it needs too.
-    bound = {ASKED: (share + 2.0 * most) / 3.0, ASKED_PACE: pace}
+    bound = {ASKED: (share + 2.0 * most) / 3.0, ASKED_PACE: pace, **limits}
     return bound if share < most else {} if largest < most else None
 
 

@@ -46,8 +46,9 @@ def begins(loop: Loop, motion: Held, numbers: Mapping[str, Any], scales: Mapping
             if not isinstance(o, Squares):
                 evidence(name, wanted, scales)
                 continue
-            if ASKED in numbers and name.startswith(("motor", "torque")) and (len(o.z) > MANY or name.count(" ") == 1):
-                # These take long, and states of the set have told what may be asked for.
+            few = " at first " in name or (" falls " in name and len(o.z) <= MANY)
+            if ASKED in numbers and name.startswith(("motor", "torque")) and not few:
+                # Others take long, and states of the set have told what may be asked for.
                 continue
             chance, least = likely(o, scales, tried), DEFINITE
             if chance is None:

@@ -10,13 +10,13 @@ from typing import Any
 from ..held import Held
 from ..loops import AXES
 from ..norms import Norms, norms, total_of
-from ..numbers import demand, norm, reach
+from ..numbers import demand, norm, reach, transpose
 from ..polynomials import Poly, apply, derivatives, dot, fastest
 from ..reading import Numbers
 from ..regions import ANGLE, COMMANDED, SPEED, Sizes, Tube, felt, named, stretch
 from ..rules import Exceeds, Part, Squares
 from .attitude import within_turn
-from .limits import Asking, basis, heeds_momentum
+from .limits import Asking, axes_of, basis, heeds_momentum, rotors
 
 KINETIC, PACE, ASKED, ASKED_PACE = "kinetic", "kinetic.pace", "asked", "asked.pace"
 """A bound of w.Jw, and how fast it may be approached (1/s), for each unit that is left; the share of its limits that the law
@@ -68,12 +68,10 @@ def asking(motion: Held, tube: Tube) -> Asking | None:
 def commanded(motion: Held, numbers: Mapping[str, Any] | Numbers) -> Sizes:
     """Return bounds of the acceleration that the law asks for because of state and momentum, where a claim with these
     numbers shows that it keeps to a share of its limits; otherwise none."""
-    subject, share, limit = motion.loop.claim.subject, numbers.get(ASKED), numbers.get("limit")
+    share, limit, names = numbers.get(ASKED), numbers.get("limit"), [f"motors.{k}" for k in range(rotors(motion.loop))]
     torques = [[limit] * len(AXES)] if limit is not None else []
-    count = next(k for k in range(1000) if not motion.loop.wheels or f"wheel.{k}.axis.0" not in subject)
-    if count and all(f"motors.{k}" in numbers for k in range(count)):
-        axes = [[subject[f"wheel.{k}.axis.{i}"] for k in range(count)] for i in AXES]
-        torques.append(reach(axes, [numbers[f"motors.{k}"] for k in range(count)]))
+    if names and all(name in numbers for name in names):
+        torques.append(reach(transpose(axes_of(motion.loop)), [numbers[name] for name in names]))
     if share is None or not torques:
         return {}
     return named(COMMANDED, reach(motion.N, [share * min(x) for x in zip(*torques, strict=True)]))

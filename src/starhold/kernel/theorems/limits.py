@@ -50,7 +50,7 @@ def within_limits(
     limits that it would exceed elsewhere on {V <= level}."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
     limit, longest = numbers.get("limit"), numbers.get("limit.norm")
-    count = next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
+    count = rotors(loop)
     motors, stored = ([numbers.get(f"{name}.{k}") for k in range(count)] for name in ("motors", "stored"))
     limits = [x for x in (*motors, *stored) if x is not None]
     unlimited = ["unlimited-wheels"] * (loop.wheels and (not limits or len(limits) < 2 * count))
@@ -185,11 +185,21 @@ def within(
     return Squares(bound - load, [*z, *more], 0, known, [*modulo, dot(UNIT, UNIT) - 1])
 
 
+def rotors(loop: AttitudeLoop) -> int:
+    """Return how many wheels a claim lists."""
+    return next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
+
+
+def axes_of(loop: AttitudeLoop) -> Rows:
+    """Return the axes of these wheels."""
+    return [[loop.claim.subject[f"wheel.{k}.axis.{i}"] for i in AXES] for k in range(rotors(loop))]
+
+
 def allocated(loop: AttitudeLoop, motors: Most) -> tuple[Rows, list[Fraction]]:
     """Return for each wheel its share of the body's torque, and the momentum that it keeps whatever the body does: the rows
     of L = -A'(AA')^-1 and p + Lh. A motor declared to give nothing has no share."""
     subject = loop.claim.subject
-    axes = [[subject[f"wheel.{k}.axis.{i}"] for i in AXES] for k in range(len(motors))]
+    axes = axes_of(loop)
     driven = [axis if most != 0 else [Fraction(0)] * 3 for axis, most in zip(axes, motors, strict=True)]
     square = times(transpose(driven), driven)
     demand(definite(square), "the wheels do not act about three axes")
