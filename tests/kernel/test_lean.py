@@ -8,6 +8,7 @@ import pytest
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.vector import add, cross, dot, scale
+from starhold.certification.evidence.blends import Blended, Shared
 from starhold.certification.evidence.chains import Chain
 from starhold.certification.evidence.finding import read
 from starhold.kernel.held import Held
@@ -49,7 +50,7 @@ def begun(rate, damping):
         leaning_law(damping), lyapunov(damping), "points", taken=["moving target", "wheels"], period=0.5, outside=1e-8,
         error=0.0, target_rate=rate, target_acceleration=0.0, momentum=LEAN * K / rate, level=float(LEVEL), highest=1.0,
     )  # fmt: skip
-    return claim, programs, Held(AttitudeLoop(read(claim, programs)))
+    return claim, programs, Blended(AttitudeLoop(read(claim, programs)), Shared())
 
 
 @cache
