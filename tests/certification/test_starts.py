@@ -29,26 +29,20 @@ def limited(r):
 
 
 def test_floats_tell_which_limits_can_be_proved():
-    r, kept, tried, quick = random.Random(1), [], [], 0
+    r, kept = random.Random(1), []
     for _ in range(40):
         o = limited(r)
-        chance, known = likely(o, {}, []), len(tried)
-        # Multipliers of other sums tell of fewer, and of none in vain.
-        least = likely(o, {}, tried)
-        assert least <= chance + 1e-7
-        assert (least > 0.0) == (chance > 0.0)
-        quick += len(tried) == known
+        chance = likely(o, {})
         # Nearer to the border than this nothing is told.
         if abs(chance) > 1e-6:
             kept.append(chance > 0.0)
             assert (squares.squares(o, {}) is not None) == kept[-1]
     assert 10 < sum(kept) < 30 < len(kept)
-    assert 5 < quick < 30
 
 
 def test_floats_tell_nothing_where_entries_of_the_matrix_share_a_monomial():
     z = [poly(1), *Q[1:], *(a * b for a in Q[1:] for b in Q[1:2])]
-    assert likely(Squares(poly(1) - dot(Q[1:], Q[1:]), z, 0, [], [dot(Q, Q) - 1]), {}, []) is None
+    assert likely(Squares(poly(1) - dot(Q[1:], Q[1:]), z, 0, [], [dot(Q, Q) - 1]), {}) is None
 
 
 @pytest.mark.slow

@@ -25,7 +25,17 @@ from starhold.kernel.norms import norms, total_of
 from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import Poly, cross, dot, variables
 from starhold.kernel.regions import STATE
-from starhold.kernel.theorems.kinetic import ASKED, CUBIC, PACE, QUARTIC, changing, commanded, slowing, twice_energy
+from starhold.kernel.theorems.kinetic import (
+    ASKED,
+    CUBIC,
+    PACE,
+    QUARTIC,
+    changing,
+    commanded,
+    slowing,
+    speeding_up,
+    twice_energy,
+)
 from starhold.kernel.theorems.pointing import descends
 from starhold.scenario.building import build
 from starhold.studies.bodies.rigid_body import wanted_of
@@ -93,8 +103,8 @@ def test_a_bound_of_the_rate_is_nearly_the_least_that_can_be_shown():
 
     def clear(times, faster):
         motion.kinetic = Fraction(found["kinetic"]) * Fraction(times)
-        tube, pace = motion.tube(motion.region(level)), Fraction(found[PACE] * faster)
-        return (definiteness(slowing(motion, tube, motion.kinetic, pace, level), scales) or -1.0) >= CLEAR
+        rates, pace = speeding_up(motion, motion.tube(motion.region(level))), Fraction(found[PACE] * faster)
+        return (definiteness(slowing(motion, rates, motion.kinetic, pace, level), scales) or -1.0) >= CLEAR
 
     assert clear(1, 1.0)
     assert not any(clear(0.9, faster) for faster in (0.8, 0.9, 1.0, 1.1, 1.25))
@@ -140,7 +150,7 @@ def test_no_evidence_is_found_for_other_bounds(begun, name, times):
             return False
         other = renumbered(motion, {**numbers, "highest": 0})
         wanted = dict(takewhile(lambda one: one[0] != "V between samples", descends(other.loop, other)))
-        return all(squares(o, chain.scales) is not None for name, o in wanted.items() if " falls " in name)
+        return all(squares(o, chain.scales) is not None for name, o in wanted.items() if " falls" in name)
 
     assert shown(numbers)
     kinetic = motion.kinetic

@@ -61,9 +61,8 @@ class Held(Follower):
         numbers, x = loop.claim.numbers, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
         self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
-        # What `mean_rate` returned, and `changing` for a tube.
+        # What `mean_rate` returned.
         self.rates = dict[Any, tuple[Poly, Norms, Poly, Fraction]]()
-        self.changed = dict[Any, tuple[Tube, Any]]()
         # What noise adds near the target, and what momentum adds to that.
         self.swayed = self.apart = AT_REST
         self.random = numbers.get("noise.torque") or ZERO
@@ -157,9 +156,14 @@ class Held(Follower):
         # The effect of a torque on V: felt x.
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
         self.worked = [[dot(apply(self.felt, x), parts)] for parts in self.parted]
-        # 2 (1 - q0) >= |q|^2.
-        self.under = self.form(self.s / 2)
-        demand(definite(self.under), "V is not least on target")
+        # 2 (1 - q0) >= |q|^2: this ellipsoid contains {V <= 1}.
+        under = self.form(self.s / 2)
+        demand(definite(under), "V is not least on target")
+        self.around = inverse(under)
+        # Over all w, the least V is s (1 - q0) + q.Sq, with S >= stiff.
+        (ww, wq), (_, qq) = ([[row[b] for row in self.G[a]] for b in (RATE, TURN)] for a in (RATE, TURN))
+        S = plus(qq, times(transpose(wq), times(inverse(ww), wq)), -1)
+        self.stiff = min(S[i][i] + abs(S[i][i]) - sum(map(abs, S[i])) for i in AXES)
 
     @property
     def accelerated(self) -> list[Poly]:
@@ -192,12 +196,8 @@ class Held(Follower):
         return [[entry + c * (i == k > 2) for k, entry in enumerate(row)] for i, row in enumerate(self.G)]
 
     def region(self, c: Fraction) -> Region:
-        """Return a region that contains {V <= c}. Over all w, the least V is s (1 - q0) + q.Sq, with S >= -lean, and |q|^2
-        <= 2 (1 - q0); without s, where q0 > 0, with S >= stiff."""
-        (ww, wq), (_, qq) = ([[row[b] for row in self.G[a]] for b in (RATE, TURN)] for a in (RATE, TURN))
-        S = plus(qq, times(transpose(wq), times(inverse(ww), wq)), -1)
-        stiff = min(S[i][i] + abs(S[i][i]) - sum(map(abs, S[i])) for i in AXES)
-        lean = max(Fraction(0), -stiff)
+        """Return a region that contains {V <= c}; without s, the part of it with q0 > 0."""
+        stiff, lean = self.stiff, max(ZERO, -self.stiff)
         demand((self.s > 2 * lean or (self.even and stiff > 0)) and c >= 0, "V is not least on target")
         least = 1 - up(c / stiff if self.even else c / (self.s - 2 * lean))
         demand(least > -(not self.even), "a level holds the other quaternion of the target")
@@ -205,7 +205,7 @@ class Held(Follower):
             # The root of a number below 1 is not below that number.
             least = max(least, least / root(least))
         turn = root(1 - least * least) if least > 0 else Fraction(1)
-        X = [[c * x for x in row] for row in inverse(self.under)]
+        X = [[c * x for x in row] for row in self.around]
         sizes = {name: root(X[i][i]) for i, name in enumerate(STATE)}
         sizes |= lengths(X)
         if self.kinetic is not None:

@@ -9,9 +9,9 @@ from functools import cache
 from math import factorial, isqrt, prod
 
 from .loops import AXES
-from .numbers import Rows
+from .numbers import root
 from .polynomials import Monomial, Poly
-from .regions import stretch
+from .regions import stretch_squared
 
 UNIT = 1 << 32
 Norms = dict[str, Fraction]
@@ -27,7 +27,7 @@ def norms(p: Poly) -> Norms:
     bounds = Norms()
     for letters, terms in groups.items():
         vectors = "".join(letter for letter in letters if letter != "q0")
-        ways = (stretch(unfolded(terms, letter)) / (vectors.count(letter) * UNIT) for letter in {*vectors})
+        ways = (root(Fraction(unfolded(terms, x))) / (vectors.count(x) * UNIT) for x in {*vectors})
         bounds[vectors] = bounds.get(vectors, Fraction(0)) + min(ways, default=Fraction(sum(terms.values()))) / p.lower
     return bounds
 
@@ -37,19 +37,17 @@ def total_of(bounds: Norms, lengths: Mapping[str, Fraction]) -> Fraction:
     return sum((x * prod(lengths[letter] for letter in letters) for letters, x in bounds.items()), Fraction(0))
 
 
-def unfolded(terms: Mapping[Monomial, int], letter: str) -> Rows:
-    """Return bounds, in units, of the entries of the matrix M of terms x.My, where x is the sum of all vectors with the
-    letter, and y has the products of all others: the square of the product of their lengths is the sum of squares of
-    products, each as often as it occurs."""
-    places = dict[Monomial, int]()
-    entries = dict[tuple[int, int], int]()
+def unfolded(terms: Mapping[Monomial, int], letter: str) -> int:
+    """Return a bound, in squares of units, of the squared norm of the matrix M of terms x.My, where x is the sum of all
+    vectors with the letter, and y has the products of all others: the square of the product of their lengths is the sum of
+    squares of products, each as often as it occurs."""
+    columns = dict[Monomial, list[int]]()
     for m, c in terms.items():
         for k in AXES:
             if count := m.count(name := f"{letter}{k + 1}"):
                 left = without(m, name)
-                place = k, places.setdefault(left, len(places))
-                entries[place] = entries.get(place, 0) + c * count * share(left)
-    return [[Fraction(entries.get((k, place), 0)) for place in range(len(places))] for k in AXES]
+                columns.setdefault(left, [0] * len(AXES))[k] += c * count * share(left)
+    return stretch_squared([*columns.values()])
 
 
 def without(m: Monomial, name: str) -> Monomial:

@@ -238,10 +238,15 @@ def root(x: Fraction) -> Fraction:
 
 def up(x: Fraction) -> Fraction:
     """Return a short, tight upper bound of a number."""
-    above, below = x.numerator.bit_length(), x.denominator.bit_length()
-    Account.spend(2, above + below)
-    places = 64 + max(0, below - above)
-    return Fraction(-((-x.numerator << places) // x.denominator), 1 << places)
+    return up_quotient(x.numerator, x.denominator)
+
+
+def up_quotient(upper: int, lower: int) -> Fraction:
+    """Return a short, tight upper bound of a quotient."""
+    over, under = upper.bit_length(), lower.bit_length()
+    Account.spend(2, over + under)
+    places = 64 + max(0, under - over)
+    return Fraction(-((-upper << places) // lower), 1 << places)
 
 
 def norm(v: Iterable[Fraction]) -> Fraction:

@@ -10,7 +10,7 @@ from math import gcd, lcm, prod
 from operator import mul
 from typing import Any, TypeAlias, cast
 
-from .numbers import Account, RefusedError, Rows, demand, rational, read_dict, up, whole
+from .numbers import Account, RefusedError, Rows, demand, rational, read_dict, up, up_quotient, whole
 
 Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
@@ -186,9 +186,13 @@ def largest(rows: Sequence[Sequence[Poly]], sizes: Mapping[str, Fraction], share
         Account.spend(len(p.upper), p.bits + p.degree * bits)
         # The sums of the terms of each degree.
         sums = [0] * (p.degree + 1)
-        for m, c in p.upper.items():
-            sums[len(m)] += prod(map(size, m)) * abs(c) * (1 if share is None else sum(map(share, m)))
-        return up(Fraction(reduce(lambda higher, terms: higher * below + terms, sums), p.lower * below**p.degree))
+        if share is None:
+            for m, c in p.upper.items():
+                sums[len(m)] += prod(map(size, m), start=abs(c))
+        else:
+            for m, c in p.upper.items():
+                sums[len(m)] += prod(map(size, m)) * abs(c) * sum(map(share, m))
+        return up_quotient(reduce(lambda higher, terms: higher * below + terms, sums), p.lower * below**p.degree)
 
     return [list(map(bound, row)) for row in rows]
 

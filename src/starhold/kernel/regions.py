@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from operator import mul
 from typing import NamedTuple
 
 from .loops import AXES, RATES, TURNS
@@ -220,8 +219,13 @@ def stretch(rows: Rows) -> Fraction:
     """Return a bound of the norm of a matrix: by the sums of its rows and of its columns, or by all entries."""
     numbers, below = whole([abs(x) for row in rows for x in row])
     lines = [numbers[k : k + len(rows[0])] for k in range(0, len(numbers), len(rows[0]))]
+    return root(Fraction(stretch_squared(lines), below * below))
+
+
+def stretch_squared(lines: list[list[int]]) -> int:
+    """Return a bound of the square of the norm of a matrix without negative entries."""
     across, down = max(map(sum, lines)), max(map(sum, zip(*lines, strict=True)))
-    return root(Fraction(min(across * down, sum(map(mul, numbers, numbers))), below * below))
+    return min(across * down, sum(x * x for line in lines for x in line))
 
 
 def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:

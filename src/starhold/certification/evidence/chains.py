@@ -20,9 +20,9 @@ from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.shapes import Shape
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.matrices import floats
-from starhold.kernel.numbers import RefusedError, plus, times, transpose
+from starhold.kernel.numbers import RefusedError
 from starhold.kernel.regions import STATE, Tube, balls, factored, least_form
-from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, spread, waited
+from starhold.kernel.theorems.pointing import ROUNDS, forgotten, on_level, periods, waited
 from starhold.kernel.theorems.response import Response, first_of, responds
 
 linalg: Any = import_module("scipy.linalg")
@@ -183,20 +183,20 @@ class Chain:
     def tighten(self, tube: Tube) -> Ends:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
         angle, fastest = ends(self.motion, tube, tube.region.X)
-        heed, corners = HEED, self.motion.corners()
+        heed, A, corners = HEED, floats(self.motion.near.A), np.array(list(map(floats, self.motion.corners())))
         away, entered = self.motion.away, self.motion.entered(tube)
         for _ in range(ELLIPSOIDS):
             within, more = forgotten(self.motion, tube)
             pushes = self.motion.linear(within)
             sized = [floats(B) * float(b) for B, b in pushes]
-            ellipsoid = smallest(floats(self.motion.near.A), np.array(list(map(floats, corners))), sized, heed)
+            ellipsoid = smallest(A, corners, sized, heed)
             if ellipsoid is None:
                 break
             shape, shares = ellipsoid
             X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
-            added = spread(a, pushes)
-            moved = (plus(added, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
-            rate = max(highest_ratio(after, X) for after in moved)
+            room = 1 - sum(a)
+            added = sum(B @ B.T / float(x) for B, x in zip(sized, a, strict=True))
+            rate = max(highest_ratio(added + C @ floats(X) @ C.T / float(room), X) for C in corners)
             reach = highest_ratio(entered, X)
             inner = self.motion.tube(within.region.within(X, away))
             more += waited(self.motion, within, inner)
@@ -209,7 +209,6 @@ class Chain:
             self.samples += more
             one = {"shape": [[str(x) for x in row] for row in X], "shares": [str(x) for x in a]}
             self.ellipsoids.append(one | {"rate": str(Fraction(rate)), "reach": str(Fraction(reach))})
-            room = 1 - sum(a)
             fall = 1 - Fraction(rate) * room
             self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
             tube, entered, (angle, fastest) = inner, X, end

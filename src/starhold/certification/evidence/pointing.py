@@ -298,7 +298,7 @@ class Pushed:
         set holds states beyond; and of shapes whose set demands little torque."""
         for shape in [lean.shape for lean in self.slowest if lean.shape not in self.stuck]:
             whole = self.chain(shape, angle, rate)
-            if slow := slowed(whole.motion, whole.level, angle, rate, limits):
+            if slow := slowed(whole, angle, rate, limits):
                 yield self.chain(shape, angle, rate, slow)
         for shape in soft(self.sampled(self.usual[0]).motion, limits, angle, rate, self.usual):
             yield self.chain(shape, angle, rate)

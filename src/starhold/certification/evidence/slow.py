@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.certification.evidence.chains import Chain
 from starhold.certification.evidence.shapes import on_border, shares
 from starhold.certification.evidence.squares import CLEAR, definiteness
 from starhold.certification.evidence.terms import valued
@@ -28,6 +29,7 @@ from starhold.kernel.theorems.kinetic import (
     kinds_of,
     mean_rate,
     slowing,
+    speeding_up,
     twice_energy,
 )  # fmt: skip
 
@@ -43,14 +45,16 @@ what it asks for, how many turns and how many states of a set are examined, at h
 one in how many paces is examined at first."""
 
 
-def slowed(motion: Held, level: float, angle: float, rate: float, limits: dict[str, Any]) -> dict[str, float]:
+def slowed(whole: Chain, angle: float, rate: float, limits: dict[str, Any]) -> dict[str, float]:
     """Return the claim's numbers of bounds that seem to hold in {V <= level} for motions from a start: of the rate, and of
-    the torque if that exceeds its limits nonetheless; none where one is not found."""
+    the torque if that exceeds its limits nonetheless; none where one is not found. Where V rises anyway, that of the rate
+    does."""
+    motion, level = whole.motion, whole.level
     try:
         slow = bound_of_rate(motion, level, rate)
         limits = {name: x for name, x in limits.items() if name != "limit.norm"}
         rows = shares(motion, limits)
-        if slow and len(rows) and motion.plan is None and motion.loop.added is None:
+        if slow and len(rows) and motion.plan is None and motion.loop.added is None and not whole.rises():
             torque = bound_of_torque(motion, level, angle, rate, rows, limits)
             return {} if torque is None else slow | torque
     except RefusedError:
@@ -76,11 +80,11 @@ def bound_of_rate(motion: Held, level: float, rate: float) -> dict[str, float]:
             break
         motion.kinetic = Fraction(bound)
         tube = motion.tube(motion.region(Fraction(level)))
-        _, (more,), pushed = changing(motion, tube, [G], QUARTIC)
-        after = needed + float(more + pushed) / paces
+        faster = speeding_up(motion, tube)
+        after = needed + float(faster[1]) / paces
         least, pace = max(float(after.min()), begun), float(paces[int(np.argmin(after))])
         if least < bound:
-            clear = definiteness(slowing(motion, tube, motion.kinetic, Fraction(pace), Fraction(level)), scales)
+            clear = definiteness(slowing(motion, faster, motion.kinetic, Fraction(pace), Fraction(level)), scales)
             if clear is not None and clear >= CLEAR:
                 return {KINETIC: bound, PACE: pace}
             bound, wider = bound * wider, wider * wider

@@ -38,15 +38,20 @@ def stays_slow(motion: Held, tube: Tube) -> Part[list[Poly]]:
     demand(0 < motion.h * pace <= 1 and "rate" not in numbers, "a bound of the rate is not properly approached")
     if "start.rate" in numbers:
         yield "rate at first", Exceeds(bound, stretch(loop.given) * numbers["start.rate"] ** 2)
-    yield "rate falls", slowing(motion, tube, bound, pace, numbers["level"])
+    yield "rate falls", slowing(motion, speeding_up(motion, tube), bound, pace, numbers["level"])
     return [bound - twice_energy(motion)]
 
 
-def slowing(motion: Held, tube: Tube, bound: Fraction, pace: Fraction, level: Fraction) -> Squares:
-    """Return what shows that w.Jw approaches a bound at most at a pace on {V <= level}."""
-    loop, G = motion.loop, twice_energy(motion)
-    (changed,), (rest,), pushed = changing(motion, tube, [G], QUARTIC)
-    left = pace * (bound - G) - changed - rest - pushed
+def speeding_up(motion: Held, tube: Tube) -> tuple[Poly, Fraction]:
+    """Return a polynomial and a number that together are at least the mean rate of change of w.Jw."""
+    (changed,), (rest,), pushed = changing(motion, tube, [twice_energy(motion)], QUARTIC)
+    return changed, rest + pushed
+
+
+def slowing(motion: Held, faster: tuple[Poly, Fraction], bound: Fraction, pace: Fraction, level: Fraction) -> Squares:
+    """Return what shows that w.Jw approaches a bound at most at a pace on {V <= level}. faster: of `speeding_up`."""
+    loop, (changed, rest) = motion.loop, faster
+    left = pace * (bound - twice_energy(motion)) - changed - rest
     return Squares(left, basis(loop, left), 0, [level - loop.lyapunov], [loop.sphere])
 
 
@@ -106,16 +111,11 @@ def changing(
     rates of change of functions of q and w from one sample to the next: by Taylor in the motion without disturbances, and by
     as far as these move the state."""
     sizes, h, rates = tube.sizes, motion.h, [mean_rate(motion, p, kinds) for p in parts]
-    key = id(tube), *(id(last) for _, _, last, _ in rates)
-    if key not in motion.changed:
-        speeds = motion.speeds(sizes)
-        lengths = {"w": tube.region.sizes[SPEED], "q": tube.region.sizes[ANGLE]} | motion.extents
-        moved_by, calm = motion.mover(tube)
-        away = norm(moved_by(tube.steady + tube.pushed + tube.late.moved + calm)) / h
-        # Momentum turns with the target too, grows by torques from outside, and turns with a body that is moved.
-        turned = 2 * motion.changes(sizes, 0)["h"] / h + h / 2 * away * motion.size("h")
-        rest = [total_of(bounds, lengths) + share * fastest(last, sizes, speeds) for _, bounds, last, share in rates]
-        moved = away * (felt([*parts], "w", sizes) + h / 4 * felt([*parts], "q", sizes))
-        # With the tube, so that no other one gets its identity.
-        motion.changed[key] = tube, (rest, moved + turned * felt([*parts], "h", sizes))
-    return [p for p, *_ in rates], *motion.changed[key][1]
+    speeds, lengths = motion.speeds(sizes), {"w": tube.region.sizes[SPEED], "q": tube.region.sizes[ANGLE]} | motion.extents
+    moved_by, calm = motion.mover(tube)
+    away = norm(moved_by(tube.steady + tube.pushed + tube.late.moved + calm)) / h
+    # Momentum turns with the target too, grows by torques from outside, and turns with a body that is moved.
+    turned = 2 * motion.changes(sizes, 0)["h"] / h + h / 2 * away * motion.size("h")
+    rest = [total_of(bounds, lengths) + share * fastest(last, sizes, speeds) for _, bounds, last, share in rates]
+    moved = away * (felt([*parts], "w", sizes) + h / 4 * felt([*parts], "q", sizes))
+    return [p for p, *_ in rates], rest, moved + turned * felt([*parts], "h", sizes)

@@ -85,4 +85,5 @@ COMMAND = Command(
     doing="by {}",
     unstable=True,
     body="",
+    kinds=("csv", "xml"),
 )
