@@ -42,7 +42,8 @@ def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
 def statement(claim: Claim, subject: Mapping[str, Any]) -> str:
     """The claim in a sentence without the parts that it leaves out."""
     numbers = {**claim.numbers, "refuted": claim.outcome == "refuted"}
-    return _unbounded(claim, subject) + _SENTENCES[claim.kind](numbers, subject)
+    orbit = "".join(f", on an orbit within {100.0 * share:.3g} % of a two-body one" for share in claim.numbers_of(ORBIT))
+    return _unbounded(claim, subject) + _SENTENCES[claim.kind](numbers, subject) + orbit
 
 
 def ranked(certificate: Certificate) -> list[Claim]:
@@ -90,8 +91,7 @@ def listed(words: Sequence[str]) -> str:
 
 
 def _unbounded(claim: Claim, subject: Mapping[str, Any]) -> str:
-    kept = "".join(f"on an orbit within {100.0 * share:.3g} % of a two-body one, " for share in claim.numbers_of(ORBIT))
-    kept += "between jumps of its target, " * (STEADY in claim.assumptions)
+    kept = "between jumps of its target, " * (STEADY in claim.assumptions)
     kept += "".join(f"for the flight's first {end:.6g} s, " for end in claim.numbers_of(UNTIL))
     for age in claim.numbers_of(FRESH):
         kept += f"while directions give an attitude {f'each {age:.6g} s' if age else 'at each control instant'}, "

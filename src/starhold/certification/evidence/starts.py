@@ -38,7 +38,7 @@ def start_rate(loop: ClosedLoop) -> float:
 def begins(loop: Loop, motion: Held, numbers: Mapping[str, Any], scales: Mapping[str, float]) -> bool:
     """Return whether the set of a claim with these numbers, but without levels, is sound, and the torque keeps its limits on
     it, as far as floats tell."""
-    told = set[Any]()
+    forms = set[Any]()
     try:
         begun = renumbered(motion, {**numbers, "highest": 0})
         wanted = dict(takewhile(lambda one: one[0] != "V between samples", descends(begun.loop, begun)))
@@ -52,14 +52,14 @@ def begins(loop: Loop, motion: Held, numbers: Mapping[str, Any], scales: Mapping
                 continue
             # Images in mirrors, and by half turns, differ in signs alone; the bound of the rate was found by its sum.
             alike = o.p.lower, frozenset((m, abs(c)) for m, c in o.p.upper.items()), len(o.z)
-            if name == "rate falls" or alike in told:
+            if name == "rate falls" or alike in forms:
                 continue
             chance, least = likely(o, scales), DEFINITE
             if chance is None:
                 chance, least = definiteness(o, scales), CLEAR
             if chance is None or chance < least:
                 raise NotFoundError(f"{name}: no sum of squares was found")
-            told.add(alike)
+            forms.add(alike)
     except (NotFoundError, RefusedError) as reason:
         loop.failed[POINTS] = str(reason)
         return False
