@@ -122,6 +122,7 @@ def test_a_loss_of_a_wheel_is_flown_within_what_is_proved_after_it():
     shown = present(scenario, scenario.pick(None), [failure])
     assert f"lost 1: {failure.proof.sentence}" in shown.blocks
     assert dict(zip(shown.numbers.heads(), shown.numbers.rows[0], strict=True))["proved angle (rad)"] == failure.proof.angle
+    assert "proved within, °" in [axis.get_xlabel() for axis in shown.figure().axes]
 
 
 def plotted(**initial):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from starhold.report.commands import Column, Command, Result, Table, later
@@ -147,6 +148,7 @@ def _directions(failure: Failure) -> str:
 
 def draw(failures: Sequence[Failure], title: str) -> Any:
     """Return a figure with a row per loss and a panel per quantity."""
+    from starhold.certification.rounding import shown
     from starhold.report.bars import draw_bars
 
     panels = [_bars("authority left, % of intact", failures, [100.0 * failure.share for failure in failures])]
@@ -154,21 +156,29 @@ def draw(failures: Sequence[Failure], title: str) -> Any:
         panels.append(_bars("degree of stability, 1/s", failures, [failure.eta for failure in failures]))
     panels.append(_bars("settling time, s", failures, [failure.settling for failure in failures]))
     if any(failure.certified is not None for failure in failures):
-        # Rounded down, so that it never exceeds the proved value.
-        turns = [None if f.certified is None else math.floor(10.0 * math.degrees(f.certified[0])) / 10.0 for f in failures]
-        panels.append(_bars("certified turn, °", failures, turns, "not proved"))
+        turns = [None if f.certified is None else math.degrees(f.certified[0]) for f in failures]
+        panels.append(_bars("certified turn, °", failures, turns, "not proved", shown))
+    if any(failure.proof is not None for failure in failures):
+        angles = [None if f.proof is None or f.proof.angle is None else math.degrees(f.proof.angle) for f in failures]
+        panels.append(_bars("proved within, °", failures, angles, "not proved", partial(shown, up=True)))
     rows, hues = [failure.name for failure in failures], [0 if failure.lost else 2 for failure in failures]
     struck = {k: f"no torque about {_directions(failure)}" for k, failure in enumerate(failures) if not failure.controllable}
     kinds = {"intact": 2, "three axes left": 0}
     return draw_bars(title, "", rows, hues, panels, kinds, "as intact", "lost wheels", struck, "an axis without torque")
 
 
-def _bars(label: str, failures: Sequence[Failure], values: Sequence[float | None], missing: str = "not settled") -> Any:
-    """Return a panel with the number at the end of each bar, or the reason why there is none."""
+def _bars(
+    label: str,
+    failures: Sequence[Failure],
+    values: Sequence[float | None],
+    missing: str = "not settled",
+    text: Callable[[float], str] = "{:.3g}".format,
+) -> Any:
+    """Return a panel with the number at the end of each bar, as `text` writes it, or the reason why there is none."""
     from starhold.report.bars import Bars
 
     lost = ["diverged" if f.diverged_at is not None else "not flown" if f.refused else missing for f in failures]
-    words = [why if value is None else f"{value:.3g}" for value, why in zip(values, lost, strict=True)]
+    words = [why if value is None else text(value) for value, why in zip(values, lost, strict=True)]
     return Bars(label, [value or 0.0 for value in values], words, values[0])
 
 
