@@ -186,12 +186,8 @@ def largest(rows: Sequence[Sequence[Poly]], sizes: Mapping[str, Fraction], share
         Account.spend(len(p.upper), p.bits + p.degree * bits)
         # The sums of the terms of each degree.
         sums = [0] * (p.degree + 1)
-        if share is None:
-            for m, c in p.upper.items():
-                sums[len(m)] += prod(map(size, m), start=abs(c))
-        else:
-            for m, c in p.upper.items():
-                sums[len(m)] += prod(map(size, m)) * abs(c) * sum(map(share, m))
+        for m, c in p.upper.items():
+            sums[len(m)] += prod(map(size, m), start=abs(c)) * (1 if share is None else sum(map(share, m)))
         return up_quotient(reduce(lambda higher, terms: higher * below + terms, sums), p.lower * below**p.degree)
 
     return [list(map(bound, row)) for row in rows]
