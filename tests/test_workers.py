@@ -62,7 +62,7 @@ def told(folder, files, *words):
     command = [sys.executable, "-m", "pytest", "-c", os.devnull, "--rootdir", ".", "-p", "no:hypothesispytest", *words]
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    return done.returncode, done.stdout
+    return done.returncode, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -83,6 +83,7 @@ def test_a_worker_that_ends_fails_the_test_it_ran_and_the_run(tmp_path):
 
 
 def test_the_first_failure_ends_the_run_where_that_is_asked_for(tmp_path):
-    code, text = told(tmp_path, FILES | SLOW, "--workers=2", "-x")
+    code, text = told(tmp_path, FILES | SLOW, "--workers=2", "-x", "-W", "error")
     assert code == 1
     assert "stopping after 1 failures" in text
+    assert "unclosed" not in text

@@ -79,7 +79,8 @@ def pytest_runtestloop(session):
     try:
         _hear(session, workers)
     finally:
-        for process in workers.values():
+        for pipe, process in workers.items():
+            pipe.close()
             os.kill(process, signal.SIGTERM)
             os.waitpid(process, 0)
     return True
@@ -113,7 +114,6 @@ def _hear(session, workers):
                 if session.shouldfail:
                     raise session.Failed(session.shouldfail)
     for pipe in workers:
-        pipe.close()
         if pipe not in done and pipe in running:
             nodeid, location = running[pipe]
             text = "the process that ran this test ended"
