@@ -19,7 +19,6 @@ PARENT = {"id": "S", "text": "It points | <b> [red]"}
 REQUIRED = [PARENT, SETTLES | {"at_most": 1, "parent": "S"}, PHASE, ERROR, MANY, PROOF, {"id": "i", "method": "inspection"}]
 
 
-@pytest.mark.slow
 def test_a_review_tells_all_that_is_known_and_computes_each_once(monkeypatch, tmp_path):
     used = []
 

@@ -1,7 +1,10 @@
 """The account of a check's work: what operations cost by the length of their numbers, to the last one that it allows."""
 
+from fractions import Fraction
+
 import pytest
 
+from starhold.certification.matrices import inverted, least, unlimited
 from starhold.kernel.numbers import LONGEST, WORK, Account, RefusedError
 
 
@@ -23,3 +26,11 @@ def test_the_longest_number_is_the_last_one_that_is_taken():
     Account.spend(1, LONGEST)
     with pytest.raises(RefusedError, match="too long"):
         Account.spend(1, LONGEST + 1)
+
+
+@pytest.mark.parametrize("computed", [inverted, least])
+def test_a_search_goes_on_without_a_limit_after_what_it_computes(computed):
+    """The account of a check that was opened in a search ended it after a while."""
+    unlimited()
+    computed([[Fraction(2), Fraction(1)], [Fraction(1), Fraction(3)]])
+    assert Account.left > 1000 * WORK

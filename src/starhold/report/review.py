@@ -278,7 +278,7 @@ def _campaign(review: Review) -> Iterator[Piece]:
     shown: list[Table | None] = [tables.verdicts(result, words), tables.runs(result), tables.metrics(result, words)]
     shown += [tables.dispersions(result), *tables.indices(result, words)]
     if law.drivers is not None:
-        shown.append(tables.drivers(law.drivers, words, DRIVERS)._replace(heading="What drives failures and metrics"))
+        shown.append(tables.drivers(law.drivers, words, DRIVERS)._replace(title="What drives failures and metrics"))
     for one in shown:
         if one is not None and one.rows:
             yield one._replace(rows=_safe_rows(one.rows))

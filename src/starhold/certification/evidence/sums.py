@@ -30,7 +30,8 @@ from starhold.certification.evidence.terms import (
     times,
     unit,
 )
-from starhold.kernel.numbers import Account, RefusedError
+from starhold.certification.matrices import unlimited
+from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Monomial, Poly, apply, dot, read_poly, total
 from starhold.kernel.rules import Sum
 
@@ -70,7 +71,7 @@ class Guess:
         basis: Sequence[Poly] | None,
         curved: bool = False,
     ) -> None:
-        Account.left = 10**12
+        unlimited()
         self.o, self.basis = o, basis
         names = sorted({x for q in (o.p, *o.known, *o.modulo, *o.strict) for x in q.names})
         self.scale = {x: unit(scales.get(x, 1.0)) for x in names}

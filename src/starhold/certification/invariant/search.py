@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from starhold.certification.invariant.prover import Attempt
 from starhold.certification.invariant.system import System, check_sizes, program
+from starhold.certification.matrices import unlimited
 from starhold.kernel.cells import Cell as Wired
-from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import Poly, poly, var
 
 Array = NDArray[np.float64]
@@ -89,8 +89,7 @@ class Candidate:
 
     def at(self, p: Poly, state: State) -> Fraction:
         """The value of a polynomial at an exact state."""
-        # A search has no limit on work.
-        Account.left = 10**12
+        unlimited()
         return p.at(self.named(state)).number
 
     def named(self, state: State) -> dict[str, Fraction]:
@@ -99,7 +98,7 @@ class Candidate:
 
     def near(self, state: State) -> list[Cell]:
         """All the cells, thin ones too, whose closures hold an exact state."""
-        Account.left = 10**12
+        unlimited()
         return [cell for cell in self.cells if cell.wired.holds(self.named(state))]
 
     def has(self, state: State) -> bool:

@@ -26,9 +26,9 @@ from starhold.certification.invariant import search
 from starhold.certification.invariant.prover import Attempt, proved, scales
 from starhold.certification.invariant.search import Candidate
 from starhold.certification.invariant.system import System, program, turned
-from starhold.certification.matrices import fraction
+from starhold.certification.matrices import fraction, unlimited
 from starhold.kernel.check import prove as kernel_proves
-from starhold.kernel.numbers import Account, RefusedError
+from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly as Exact
 from starhold.kernel.polynomials import var
 from starhold.kernel.reading import Claim as KernelClaim
@@ -329,5 +329,5 @@ class _Proof:
 
 def claim_of(claim: dict[str, Any], programs: dict[str, dict[str, Any]]) -> KernelClaim:
     """Return a claim as the kernel reads it in a certificate."""
-    Account.open()
+    unlimited()
     return read_certificate(json.dumps(certificate([*programs.values()], [claim])))[0]
