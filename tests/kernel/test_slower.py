@@ -94,6 +94,21 @@ def test_flights_with_momentum_come_near_to_the_bounds_and_not_beyond():
     assert (used > 0.8).all()
 
 
+def test_a_law_that_is_told_of_the_body_late_keeps_to_its_limits_too():
+    """Errors that grow with the motion are known in a tube, and so is what the law asks for because of them."""
+    tracker = {"type": "star-tracker", "cross": "1e-6 rad", "roll": "1e-6 rad", "delay": "0.2 s"}
+    scenario = sh.load("wheels-orbital").with_({"part": [tracker]})
+    loop = Loop(make_subject(build(scenario, scenario.pick("wheel"))))
+    pushed = Pushed(loop, loop.known.against(loop.known.envelope(True)), True)
+    assert pushed.find(math.radians(60.0), 0.004, loop.limits), loop.failed
+    [proof] = loop.claims
+    assert {"asked", "motors.0", "error.attitude.per.rate"} <= proof["numbers"].keys()
+    found, used = flown(proof, loop.by_digest, longest=150)
+    assert not found
+    assert (used <= 1.0).all()
+    assert (used > 0.7).all()
+
+
 def test_a_bound_of_the_rate_is_nearly_the_least_that_can_be_shown():
     loop = Loop(make_subject(built("cubesat-nadir", "wheel")))
     pushed = Pushed(loop, loop.known.against(loop.known.envelope(True)), True)

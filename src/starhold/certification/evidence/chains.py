@@ -112,7 +112,9 @@ class Chain:
             form = floats(least_form(slope, motion.region(Fraction(self.level))))
         except RefusedError:
             return True
-        scale = np.sqrt(np.maximum(np.diag(form), 1e-300))
+        if float(np.diag(form).min()) <= 0.0:
+            return True
+        scale = np.sqrt(np.diag(form))
         return float(np.linalg.eigvalsh(form / np.outer(scale, scale))[0]) < -FAR
 
     def wants_more(self) -> bool:

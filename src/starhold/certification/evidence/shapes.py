@@ -80,7 +80,9 @@ def falls(motion: Held, P: Array, acceleration: Array, q0: Array) -> tuple[Array
         # 2 p (1 - q0) grows with q.w alone.
         slope[:, TURN, RATE] += P[:, TURN, TURN] * (1.0 - turned) / 2.0
     form = -(slope + slope.transpose(0, 2, 1))
-    scale = np.sqrt(np.maximum(np.einsum("nii->ni", form), 1e-300))
+    diagonal = np.einsum("nii->ni", form)
+    # Where it is not positive, no scale makes the form definite.
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     within = np.linalg.inv(np.linalg.cholesky(P))
     forms = form / scale[:, :, None] / scale[:, None, :], within @ form @ within.transpose(0, 2, 1)
     definite, pace = (np.asarray(np.linalg.eigvalsh(one)[:, 0], dtype=np.float64) for one in forms)

@@ -102,7 +102,8 @@ def bound_of_torque(
     """Return the numbers of a bound of what the law asks for because of state and momentum that seems to hold, with the
     limits of which it is a share; none where it asks for less than its limits anyway, clearly so or without a bound, and
     None where it does not. rows: what takes the torque to shares of its limits."""
-    region = motion.region(Fraction(level))
+    # The region of a tube says how much errors grow in it.
+    region = motion.tube(motion.region(Fraction(level))).region
     command, each, sizes = motion.alone, np.linalg.norm(rows, axis=1), region.sizes
     beside = minus(motion.loop.u, command)
     besides = [felt(beside, letter, sizes) * motion.size(letter) for letter in "era"]
