@@ -268,7 +268,7 @@ def _sums(steps: list[Array], phase: int, count: int, size: int, read: bool) -> 
     motion, amiss = reduce(lambda one, A: A @ one, order, np.eye(size)), steps[phase][size:, :size]
     powers = np.array([amiss])
     while len(powers) < count:
-        powers, motion = np.concatenate([powers, powers @ motion]), motion @ motion
+        powers, motion = np.concatenate([powers, powers[: count - len(powers)] @ motion]), motion @ motion
     sizes = np.zeros((2, readings + 1, every * (len(powers) + 1)))
     # The gyro's, without its walk, and the attitudes', which are new at the last step of a cycle; a turn that is left out is
     # like one by which the attitude, the first of the errors, is off as the step begins.
@@ -286,7 +286,10 @@ def _sums(steps: list[Array], phase: int, count: int, size: int, read: bool) -> 
                 continue
             made = powers @ (since @ given[:size, column])
             for row, part in enumerate((0, 3)):
-                sizes[row, k, lag::every][: len(made)] = np.linalg.norm(made[:, part : part + 3], 2, axis=(1, 2))
+                # Faster than singular values.
+                block = made[:, part : part + 3]
+                squared = np.linalg.eigvalsh(block.transpose(0, 2, 1) @ block)[:, -1]
+                sizes[row, k, lag::every][: len(made)] = np.sqrt(np.maximum(squared, 0.0))
         since = since @ steps[at][:size, :size] if lag else since
     return sizes
 
