@@ -224,6 +224,9 @@ def test_the_mission_turns_to_the_sun_from_what_detumbling_leaves_and_no_flight_
     assert math.degrees(sun.numbers["slew_angle"]) > 24.0
     for mode in ("sun", "nadir", "unload", "sun to nadir", "nadir to unload"):
         claim = found[f"mission: {mode}"].claim("pointing")
-        broken, reached = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, 1).worst()
+        attack = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, 1)
+        # Until after the bound holds.
+        attack.longest = 2000
+        broken, reached = attack.worst()
         assert not broken
         assert min(reached[1:]) > 0.1

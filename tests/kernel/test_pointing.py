@@ -304,7 +304,7 @@ def test_what_is_left_of_the_motion_before_a_response_counts(monkeypatch):
     assert not Oracle(content, claim).holds()
 
 
-@pytest.mark.parametrize(("name", "reached"), leading([("cubesat", 0.8), ("body", 0.8), ("skew", 0.8)]))
+@pytest.mark.parametrize(("name", "reached"), leading([("cubesat", 0.8), ("body", 0.75), ("skew", 0.8)]))
 def test_no_flight_leaves_what_is_proved_and_some_come_near(name, reached):
     told, n = POINTING[name][1], numbers(contents("flying", name))
     fleet = fleet_of(name, *told[:2])
