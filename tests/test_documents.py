@@ -83,6 +83,7 @@ MEASURED = {
     "starhold certify cubesat-nadir --law wheel": (
         r"within [\d.]+° of the target after [\d.]+ s at all times",
         r"from up to [\d.]+° at up to [\d.]+°/s",
+        r"on an orbit within [\d.]+ % of a two-body one",
         r"all \d+ parts of the loop are in it",
     ),
     "starhold verify cubesat-mission": (r"[\d.]+ deg\b",),

@@ -66,18 +66,19 @@ def planned(oracle):
 
 
 PROVED = {
-    "three-laws": (10.0, 0.00723, 0),
-    "geostationary": (12.0, 0.02345, 0),
-    "cubesat-slew": (6.0, 0.00935, 0),
-    "three-laws-noise": (10.0, 0.00723, 2),
+    "three-laws": (10.0, 0.0, 0.00723, 0),
+    "geostationary": (12.0, 0.0, 0.02345, 0),
+    "cubesat-slew": (6.0, 1.0, 0.00935, 0),
+    "three-laws-noise": (10.0, 0.0, 0.00723, 2),
 }
-"""From how many degrees, to within how many, and without how many parts."""
+"""From how many degrees at how many a second, to within how many, and without how many parts."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n != "three-laws")) for n in PROVED])
 def test_the_predictive_laws_of_scenarios_are_proved_to_point(name):
-    begin, end, without = PROVED[name]
+    begin, rate, end, without = PROVED[name]
     claim = claimed(name)
+    assert math.degrees(claim.numbers.get("rate_start", 0.0)) >= rate * (1 - 1e-9)
     assert math.degrees(claim.numbers["slew_angle"]) >= begin * (1 - 1e-9)
     assert 0.5 * end < math.degrees(claim.numbers["angle"]) <= end
     assert "best-plan" in claim.assumptions

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from starhold.certification.evidence.blends import Blended
-from starhold.certification.evidence.ellipsoids import HEED, MORE, ends, highest_ratio, smallest
+from starhold.certification.evidence.ellipsoids import HEED, MORE, ends, fed_by, highest_ratio, smallest
 from starhold.certification.evidence.finding import concluded
 from starhold.certification.evidence.lates import of_late
 from starhold.certification.evidence.responses import find_response
@@ -196,9 +196,9 @@ class Chain:
                 break
             shape, shares = ellipsoid
             X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
-            room = 1 - sum(a)
-            added = sum(B @ B.T / float(x) for B, x in zip(sized, a, strict=True))
-            rate = max(highest_ratio(added + C @ floats(X) @ C.T / float(room), X) for C in corners)
+            room, added = 1 - sum(a), fed_by(sized, map(float, a))
+            moved = added + corners @ floats(X) @ corners.transpose(0, 2, 1) / float(room)
+            rate = max(highest_ratio(after, X) for after in moved)
             reach = highest_ratio(entered, X)
             inner = self.motion.tube(within.region.within(X, away))
             more += waited(self.motion, within, inner)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from math import inf, isfinite, sqrt
 from typing import Any
@@ -36,7 +37,7 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
 
     def shape(x: Array) -> tuple[float, Array, Array]:
         shares, more = np.exp(x[:-1]) / (1.0 + np.exp(x[:-1]).sum()) * (1.0 - radius**2), np.exp(x[-1])
-        fed = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(A))
+        fed = fed_by(pushes, shares)
         fed += 1e-14 * np.diag(np.diag(fed))
         kept = 1.0 - shares.sum()
         if radius**2 * (1.0 + more) >= kept:
@@ -69,6 +70,11 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
     return better * LARGER, [float(a) for a in shares]
 
 
+def fed_by(pushes: Sequence[Array], shares: Iterable[float]) -> Array:
+    """Return what disturbances add to the matrix of an ellipsoid that moves with the motion, in floats."""
+    return np.sum([B @ B.T / a for B, a in zip(pushes, shares, strict=True)], axis=0)
+
+
 def extent(X: Array, heed: float) -> float:
     """Return the logarithm of the largest rotation in an ellipsoid, and of its largest rate by its weight."""
     wide, turned = (float(np.log(np.linalg.eigvalsh(X[k, k])[-1])) for k in (RATE, TURN))
@@ -81,7 +87,8 @@ def fitted(corners: Array, pushes: list[Array], shares: Array, X: Array, heed: f
     kept, scale = 1.0 - float(shares.sum()), np.sqrt(np.diag(X))
     if kept <= 0.0:
         return None
-    fed = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(X)) / np.outer(scale, scale)
+    plain = fed_by(pushes, shares)
+    fed = plain / np.outer(scale, scale)
     size = len(X)
     # The entries of a symmetric matrix by which an interior point knows it.
     pairs = [(i, k) for k in range(size) for i in range(k + 1)]
@@ -99,7 +106,6 @@ def fitted(corners: Array, pushes: list[Array], shares: Array, X: Array, heed: f
     if solution is None:
         return None
     fit = np.einsum("n,nij->ij", solution[: len(pairs)], basis) * np.outer(scale, scale)
-    plain = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(X))
     room = fit - corners @ fit @ corners.transpose(0, 2, 1) / kept
     if np.linalg.eigvalsh(fit)[0] <= 0.0 or np.linalg.eigvalsh(room).min() <= 0.0:
         return None
